@@ -1,0 +1,33 @@
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+namespace weft::cli {
+
+// Each command lives in cli/<command>.cpp and adds itself to the application: it declares its flags
+// and sets a callback that runs it. The callback returns normally on success and throws core::Error
+// otherwise; main prints the error and turns its code into the exit code.
+void add_new(CLI::App& app);      // new --preset silk: start a description
+void add_import(CLI::App& app);   // import DRAFT.wif -o FABRIC.textproto
+void add_preview(CLI::App& app);  // draw the geometry
+void add_export(CLI::App& app);   // fibres as curves for other programs
+void add_run(CLI::App& app);      // the whole precomputation in one process
+void add_up(CLI::App& app);       // a local cluster
+void add_submit(CLI::App& app);
+void add_jobs(CLI::App& app);
+void add_watch(CLI::App& app);
+void add_cancel(CLI::App& app);
+void add_workers(CLI::App& app);
+void add_fabrics(CLI::App& app);
+void add_versions(CLI::App& app);
+void add_fetch(CLI::App& app);
+void add_inspect(CLI::App& app);
+void add_verify(CLI::App& app);
+void add_render(CLI::App& app);
+void add_compare(CLI::App& app);
+
+}  // namespace weft::cli

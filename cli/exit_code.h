@@ -1,0 +1,27 @@
+#pragma once
+
+#include "core/error.h"
+
+namespace weft::cli {
+
+inline constexpr int kExitFailed = 1;    // the work failed, or an input is wrong
+inline constexpr int kExitWrongUse = 2;  // the command line is wrong
+inline constexpr int kExitNotFound = 3;
+inline constexpr int kExitRefused = 4;      // not allowed, or over a limit
+inline constexpr int kExitUnavailable = 5;  // the coordinator or a file system does not answer
+
+[[nodiscard]] constexpr int exit_code(core::Code code) {
+  switch (code) {
+    case core::Code::kNotFound:
+      return kExitNotFound;
+    case core::Code::kPermissionDenied:
+    case core::Code::kResourceExhausted:
+      return kExitRefused;
+    case core::Code::kUnavailable:
+      return kExitUnavailable;
+    default:
+      return kExitFailed;
+  }
+}
+
+}  // namespace weft::cli

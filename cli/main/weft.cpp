@@ -1,0 +1,30 @@
+#include <cstdio>
+#include <exception>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.h"
+#include "cli/exit_code.h"
+#include "core/error.h"
+
+int main(int argc, char** argv) {
+  namespace cli = weft::cli;
+  namespace core = weft::core;
+  CLI::App app{"weft shows cloth as it is: from a weaving draft to a picture of every fibre."};
+  app.name("weft");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "weft 0.1.0");
+  // One line per command, in the order of commands.h.
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : cli::kExitWrongUse;
+  } catch (const core::Error& error) {
+    std::fprintf(stderr, "weft: %s\n", error.what());
+    return cli::exit_code(error.code());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "weft: internal error: %s\n", error.what());
+    return cli::kExitFailed;
+  }
+  return 0;
+}

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/digest.h"
+#include "proto/weft/v1/fabric.pb.h"
+#include "proto/weft/v1/task.pb.h"
+
+namespace weft::coordinator {
+
+enum class StageName { kGeometry, kGrid, kVisibility, kBasis, kCoefficients, kTransfer };
+[[nodiscard]] const char* to_string(StageName name);
+
+// One stage of a job, ready to run: everything its shards read is known.
+struct Stage {
+  StageName name = StageName::kGeometry;
+  v1::TaskSpec spec;
+  std::uint64_t shard_count = 0;
+  std::vector<core::Digest> inputs;        // result blobs that every shard reads
+  std::vector<core::Digest> shard_inputs;  // empty, or one result blob per shard
+};
+
+// Names the work of one shard; equal digests mean equal results. Covers the numerics fingerprint,
+// the spec, the inputs and the index.
+[[nodiscard]] core::Digest shard_digest(const Stage& stage, std::uint64_t shard,
+                                        const core::Digest& fingerprint);
+
+// Results of finished stages: for each, its shards' result blobs in index order.
+struct StageResults {
+  StageName name;
+  std::vector<core::Digest> shards;
+};
+
+// The stages that can run now, given those that are finished (a job's graph grows as results come
+// in: segments and cells are known only after the geometry and the grid). Empty when the job has
+// nothing left to plan. Never names a stage that is in `finished`; the caller skips those it runs
+// already. `read_blob` returns a result's bytes.
+[[nodiscard]] std::vector<Stage> plan(
+    const v1::FabricDescription& description, const std::vector<StageResults>& finished,
+    const std::function<std::string(const core::Digest&)>& read_blob);
+
+// All stages of a job, in the order people see them.
+[[nodiscard]] std::vector<StageName> all_stages();
+
+}  // namespace weft::coordinator

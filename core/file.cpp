@@ -1,0 +1,109 @@
+#include "core/file.h"
+
+#include <atomic>
+#include <cerrno>
+#include <fstream>
+#include <system_error>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "core/error.h"
+
+namespace weft::core {
+
+namespace {
+
+[[noreturn]] void throw_errno(const std::string& what, const std::filesystem::path& path) {
+  throw Error(Code::kUnavailable, "cannot " + what + " " + path.string() + ": " +
+                                      std::generic_category().message(errno));
+}
+
+// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  Descriptor(const std::filesystem::path& path, int flags)
+      : value_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {
+    if (value_ < 0) {
+      throw_errno("open", path);
+    }
+  }
+  ~Descriptor() { ::close(value_); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  Descriptor(Descriptor&&) = delete;
+  Descriptor& operator=(Descriptor&&) = delete;
+  [[nodiscard]] int value() const { return value_; }
+
+ private:
+  int value_;
+};
+
+std::filesystem::path folder_of(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
+
+}  // namespace
+
+std::string read_file(const std::filesystem::path& path, std::uint64_t limit_bytes) {
+  std::error_code failure;
+  const bool is_folder = std::filesystem::is_directory(path, failure);
+  std::ifstream in(path, std::ios::binary);
+  if (!in || is_folder) {
+    throw Error(Code::kNotFound, "cannot read " + path.string() +
+                                     (is_folder ? ": it is a folder" : ": no such file"));
+  }
+  std::string data;
+  std::string buffer(1 << 16, '\0');
+  while (in) {
+    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    data.append(buffer, 0, static_cast<std::size_t>(in.gcount()));
+    if (data.size() > limit_bytes) {
+      throw Error(Code::kResourceExhausted, path.string() + " is larger than the limit of " +
+                                                std::to_string(limit_bytes) + " bytes");
+    }
+  }
+  return data;
+}
+
+void write_file_atomically(const std::filesystem::path& path, std::string_view data) {
+  static std::atomic<std::uint64_t> counter{0};
+  const std::filesystem::path beside =
+      path.string() + "." + std::to_string(::getpid()) + "." + std::to_string(++counter) + ".part";
+  {
+    const Descriptor file(beside, O_WRONLY | O_CREAT | O_TRUNC);
+    std::size_t written = 0;
+    while (written < data.size()) {
+      const ssize_t n = ::write(file.value(), data.data() + written, data.size() - written);
+      if (n < 0 && errno == EINTR) {
+        continue;
+      }
+      if (n < 0) {
+        const int cause = errno;
+        ::unlink(beside.c_str());
+        errno = cause;
+        throw_errno("write", path);
+      }
+      written += static_cast<std::size_t>(n);
+    }
+  }
+  publish_file(beside, path);
+}
+
+void publish_file(const std::filesystem::path& from, const std::filesystem::path& to) {
+  {
+    const Descriptor file(from, O_RDONLY);
+    if (::fsync(file.value()) != 0) {
+      throw_errno("sync", from);
+    }
+  }
+  if (::rename(from.c_str(), to.c_str()) != 0) {
+    throw_errno("rename to", to);
+  }
+  const Descriptor folder(folder_of(to), O_RDONLY | O_DIRECTORY);
+  if (::fsync(folder.value()) != 0) {
+    throw_errno("sync", folder_of(to));
+  }
+}
+
+}  // namespace weft::core

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "fabric/tile.h"
+#include "proto/weft/v1/fabric.pb.h"
+
+namespace weft::fabric {
+
+// Builds the fibres of one periodic tile from a canonical description (see description.h) or its
+// geometry part. The same description gives the same bytes. Throws core::Error(kInvalidArgument)
+// when no such cloth can be built (yarns that cannot be packed) and kResourceExhausted when the
+// tile would exceed kTileLimitBytes.
+[[nodiscard]] Tile build_tile(const v1::FabricDescription& description);
+
+// What a tile will need, computed from the description alone, before any of it is built.
+struct TileEstimate {
+  std::uint32_t ends = 0;
+  std::uint32_t picks = 0;
+  std::uint64_t fibres = 0;
+  std::uint64_t segments = 0;
+  std::uint64_t memory_bytes = 0;
+};
+[[nodiscard]] TileEstimate estimate_tile(const v1::FabricDescription& description);
+
+inline constexpr std::uint64_t kTileLimitBytes = std::uint64_t{2} << 30;
+
+}  // namespace weft::fabric

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "shading/fibre_material.h"
+
+namespace weft::shading {
+
+struct BcsdfSample {
+  glm::vec3 omega_i;  // towards the light, local frame
+  glm::vec3 weight;   // S(omega_i, omega_o) cos(theta_i) / pdf; may exceed 1 (S is not reciprocal)
+  float pdf;          // per solid angle; 0: no sample, the path ends
+};
+
+// Rows x = tangent, y = omega_o orthogonal to it, z = x cross y: omega_local = frame * omega. In
+// this frame (omega_o-space, Khungurn et al. 2017, section 4.3) phi_o = 0.
+[[nodiscard]] glm::mat3 fibre_frame(glm::vec3 tangent, glm::vec3 omega_o);
+
+// S = S_R + S_TT with the tables that evaluate and sample it fast. Directions are unit vectors that
+// point away from the fibre, in any frame whose x axis is the fibre's tangent; omega_i is the light
+// side (S is not reciprocal). Immutable after construction: any thread may call.
+class FibreBcsdf {
+ public:
+  explicit FibreBcsdf(const FibreMaterial& material);
+  // The test lobe S = 1 / pi^2, sampled by cos^2(theta): every weight is 1 (a furnace for paths).
+  [[nodiscard]] static FibreBcsdf furnace();
+
+  [[nodiscard]] const FibreMaterial& material() const;
+  [[nodiscard]] bool is_furnace() const;
+
+  // S in 1/sr, without the cosine.
+  [[nodiscard]] glm::vec3 evaluate(glm::vec3 omega_i, glm::vec3 omega_o) const;
+  // S cos(theta_i).
+  [[nodiscard]] glm::vec3 evaluate_cos(glm::vec3 omega_i, glm::vec3 omega_o) const;
+  // omega_i given omega_o by three uniform numbers in [0, 1): lobe, theta, phi.
+  [[nodiscard]] BcsdfSample sample(glm::vec3 omega_o, float u_lobe, float u_theta,
+                                   float u_phi) const;
+  // The density that sample() draws from.
+  [[nodiscard]] float pdf(glm::vec3 omega_i, glm::vec3 omega_o) const;
+  // Integral of S cos(theta_i) over omega_i (maths of W17's ambient term); theta_o in radians.
+  [[nodiscard]] glm::vec3 adjoint_albedo(float theta_o) const;
+
+ private:
+  struct Tables;
+  FibreBcsdf() = default;
+  std::shared_ptr<const Tables> tables_;  // shared: immutable and large, copies are common
+};
+
+}  // namespace weft::shading
