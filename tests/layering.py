@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""Fails when a folder includes what it must not: the table of docs/architecture.md, checked.
+
+Also keeps third-party libraries behind their one file pair. Usage: layering.py SOURCE_DIR
+"""
+
+import pathlib
+import re
+import sys
+
+MAY_INCLUDE = {
+    "proto": {"core"},  # the envelope throws core::Error
+    "core": set(),
+    "shading": set(),
+    "fabric": {"core", "proto"},
+    "transport": {"core", "shading", "fabric"},
+    "storage": {"core", "shading"},
+    "coordinator": {"core", "fabric", "proto", "storage", "shading"},
+    "worker": {"core", "fabric", "shading", "transport", "proto"},
+    "render": {"core", "shading", "fabric", "transport", "storage", "proto"},
+}
+MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
+
+# Third-party header -> the files that alone include it.
+BEHIND = {
+    r"hdf5\.h|H5.*\.h": {"storage/h5.h", "storage/h5.cpp"},
+    r"embree3/.*": {"transport/scene.cpp", "render/shell_scene.cpp"},
+    r"(OpenEXR/)?Imf.*": {"render/image.cpp"},
+    r"png\.h": {"render/image.cpp", "render/png.cpp"},
+    r"sqlite3\.h": {"coordinator/journal.h", "coordinator/journal.cpp", "coordinator/sqlite.cpp",
+                    "coordinator/sqlite.h"},
+    r"tiny_obj_loader\.h": {"render/mesh.cpp"},
+    r"openssl/.*": {"core/digest.cpp"},
+    r"Random123/.*": {"core/random.h"},
+}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+
+def mistakes_of(root: pathlib.Path):
+    for folder, allowed in MAY_INCLUDE.items():
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix not in {".h", ".cpp", ".comp"}:
+                continue
+            name = path.relative_to(root).as_posix()
+            for number, line in enumerate(path.read_text().splitlines(), 1):
+                match = INCLUDE.match(line)
+                if not match:
+                    continue
+                quoted, target = match.group(1) == '"', match.group(2)
+                first = target.split("/")[0]
+                where = f"{name}:{number}"
+                if quoted and "/" not in target:
+                    yield f"{where}: '{target}' is not a full path from the root"
+                if first in MAY_INCLUDE and first != folder and first not in allowed:
+                    yield f"{where}: {folder} may not include {first} ({target})"
+                for pattern, owners in BEHIND.items():
+                    if re.fullmatch(pattern, target) and name not in owners:
+                        yield f"{where}: {target} belongs behind {', '.join(sorted(owners))}"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1])
+    mistakes = list(mistakes_of(root))
+    for mistake in mistakes:
+        print(mistake)
+    if not any((root / folder).rglob("*.cpp") for folder in MAY_INCLUDE):
+        print(f"no sources under {root}")
+        return 1
+    return 1 if mistakes else 0
+
+
+sys.exit(main())
