@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// The limits that cluster.proto states, for both ends of a call.
+
+namespace weft::v1 {
+
+inline constexpr int kMessageLimitBytes = 64 << 20;
+inline constexpr std::size_t kChunkLimitBytes = std::size_t{1} << 20;
+inline constexpr std::uint64_t kBlobLimitBytes = std::uint64_t{1} << 30;
+inline constexpr int kFindMissingLimit = 10'000;
+inline constexpr int kCompletionLimit = 1024;
+inline constexpr std::uint32_t kFreeAttemptsLimit = 64;
+inline constexpr std::uint32_t kThreadsLimit = 4096;
+inline constexpr std::uint32_t kWaitLimitMs = 30'000;
+inline constexpr std::size_t kIdLimit = 64;
+inline constexpr std::size_t kNameLimitBytes = 128;
+inline constexpr std::size_t kErrorTextLimitBytes = 4096;
+inline constexpr std::size_t kCommentLimitBytes = 1024;
+inline constexpr std::uint32_t kListLimit = 1000;
+
+}  // namespace weft::v1
