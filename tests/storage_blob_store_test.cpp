@@ -1,0 +1,96 @@
+#include <fstream>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "storage/blob_store.h"
+
+namespace weft::storage {
+namespace {
+
+class BlobStoreTest : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::remove_all(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) /
+      (std::string("weft_blobs_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+TEST_F(BlobStoreTest, GivesBackWhatWasPut) {
+  BlobStore store(folder_);
+  const core::Digest digest = store.put("warp and weft");
+  EXPECT_EQ(digest, core::digest_of("warp and weft"));
+  EXPECT_TRUE(store.has(digest));
+  EXPECT_EQ(store.get(digest), "warp and weft");
+  EXPECT_EQ(store.put("warp and weft"), digest);
+  EXPECT_EQ(BlobStore(folder_).get(digest), "warp and weft");
+}
+
+TEST_F(BlobStoreTest, HoldsTheEmptyBlob) {
+  BlobStore store(folder_);
+  EXPECT_EQ(store.get(store.put("")), "");
+}
+
+TEST_F(BlobStoreTest, KnowsNothingThatWasNotPut) {
+  const BlobStore store(folder_);
+  EXPECT_FALSE(store.has(core::digest_of("x")));
+  EXPECT_EQ(store.get(core::digest_of("x")), std::nullopt);
+}
+
+TEST_F(BlobStoreTest, DamagedBlobCountsAsAbsentAndIsRemoved) {
+  BlobStore store(folder_);
+  const core::Digest digest = store.put("warp and weft");
+  std::ofstream(store.path_of(digest), std::ios::binary) << "warp and left";
+  EXPECT_EQ(store.get(digest), std::nullopt);
+  EXPECT_FALSE(store.has(digest));
+  store.put("warp and weft");
+  EXPECT_EQ(store.get(digest), "warp and weft");
+}
+
+TEST_F(BlobStoreTest, TruncatedBlobIsWrittenAgainByPut) {
+  BlobStore store(folder_);
+  const core::Digest digest = store.put("warp and weft");
+  std::filesystem::resize_file(store.path_of(digest), 4);
+  store.put("warp and weft");
+  EXPECT_EQ(store.get(digest), "warp and weft");
+}
+
+TEST_F(BlobStoreTest, ManyThreadsPutTheSameBlobAtOnce) {
+  BlobStore store(folder_);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&store] {
+      for (int i = 0; i < 20; ++i) {
+        store.put("blob " + std::to_string(i));
+      }
+    });
+  }
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_)) {
+    files += entry.is_regular_file() ? 1 : 0;
+  }
+  EXPECT_EQ(files, 20U);
+  EXPECT_EQ(store.get(core::digest_of("blob 7")), "blob 7");
+}
+
+TEST_F(BlobStoreTest, FolderThatCannotBeMadeIsAnError) {
+  std::filesystem::create_directories(folder_);
+  core::write_file_atomically(folder_ / "file", "not a folder");
+  try {
+    const BlobStore store(folder_ / "file" / "blobs");
+    FAIL() << "no error";
+  } catch (const core::Error& error) {
+    EXPECT_EQ(error.code(), core::Code::kUnavailable);
+    EXPECT_NE(std::string(error.what()).find("cannot create the folder"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace weft::storage
