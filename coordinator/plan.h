@@ -25,7 +25,8 @@ struct Stage {
 };
 
 // Names the work of one shard; equal digests mean equal results. Covers the numerics fingerprint,
-// the spec, the inputs and the index.
+// the spec, the inputs and the index; for transfer the index is the cell and the numbers of its
+// paths, so that a raised paths_per_cell keeps the full blocks that are there.
 [[nodiscard]] core::Digest shard_digest(const Stage& stage, std::uint64_t shard,
                                         const core::Digest& fingerprint);
 
@@ -38,10 +39,20 @@ struct StageResults {
 // The stages that can run now, given those that are finished (a job's graph grows as results come
 // in: segments and cells are known only after the geometry and the grid). Empty when the job has
 // nothing left to plan. Never names a stage that is in `finished`; the caller skips those it runs
-// already. `read_blob` returns a result's bytes.
+// already. `read_blob` returns a result's bytes. Throws core::Error(kInvalidArgument) when the
+// description is not canonical, kDataLoss when a result is malformed.
 [[nodiscard]] std::vector<Stage> plan(
     const v1::FabricDescription& description, const std::vector<StageResults>& finished,
     const std::function<std::string(const core::Digest&)>& read_blob);
+
+// The visibility shards whose results the basis is computed from, ascending: whole shards, chosen
+// by the description's seed, with at most pca_sample_segments segments together (but one shard at
+// least). All others are held out.
+[[nodiscard]] std::vector<std::uint64_t> basis_sample(const v1::FabricDescription& description,
+                                                      std::uint64_t visibility_shards);
+
+// The seed from which the coefficients' spec has each segment's rotation.
+[[nodiscard]] std::uint64_t rotation_seed(const v1::FabricDescription& description);
 
 // All stages of a job, in the order people see them.
 [[nodiscard]] std::vector<StageName> all_stages();
