@@ -1,0 +1,116 @@
+#include "render/png.h"
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include <png.h>
+
+#include "core/check.h"
+#include "core/error.h"
+#include "core/file.h"
+
+namespace weft::render {
+namespace {
+
+constexpr float kShoulder = 0.8f;  // below it tones are kept as they are
+
+float rolled_off(float value) {
+  if (value <= kShoulder) {
+    return value;
+  }
+  const float room = 1 - kShoulder;
+  return 1 - room * std::exp(-(value - kShoulder) / room);
+}
+
+// IEC 61966-2-1.
+float srgb_encoded(float linear) {
+  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
+}
+
+float luminance(const glm::vec3& rgb) {
+  return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
+}
+
+void append(png_structp png, png_bytep data, png_size_t size) {
+  auto* out = static_cast<std::string*>(png_get_io_ptr(png));
+  out->append(reinterpret_cast<const char*>(data), size);
+}
+
+// libpng must not return from its error callback. The exception unwinds its frames, which own
+// nothing that png_destroy_write_struct does not free.
+[[noreturn]] void fail(png_structp, png_const_charp message) {
+  throw core::Error(core::Code::kInternal, std::string("libpng refused the picture: ") + message);
+}
+
+class PngWriter {
+ public:
+  PngWriter() : png_(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, nullptr)) {
+    CHECK(png_ != nullptr);
+    info_ = png_create_info_struct(png_);
+    CHECK(info_ != nullptr);
+  }
+  ~PngWriter() { png_destroy_write_struct(&png_, &info_); }
+  PngWriter(const PngWriter&) = delete;
+  PngWriter& operator=(const PngWriter&) = delete;
+  PngWriter(PngWriter&&) = delete;
+  PngWriter& operator=(PngWriter&&) = delete;
+  [[nodiscard]] png_structp png() const { return png_; }
+  [[nodiscard]] png_infop info() const { return info_; }
+
+ private:
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+};
+
+}  // namespace
+
+void write_png(const std::filesystem::path& path, std::uint32_t width, std::uint32_t height,
+               std::span<const std::uint8_t> rgb) {
+  CHECK(width > 0 && height > 0);
+  CHECK_EQ(rgb.size(), std::size_t{3} * width * height);
+  std::string bytes;
+  {
+    const PngWriter writer;
+    png_set_write_fn(writer.png(), &bytes, append, nullptr);
+    png_set_IHDR(writer.png(), writer.info(), width, height, 8, PNG_COLOR_TYPE_RGB,
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_sRGB_gAMA_and_cHRM(writer.png(), writer.info(), PNG_sRGB_INTENT_PERCEPTUAL);
+    png_write_info(writer.png(), writer.info());
+    for (std::uint32_t y = 0; y < height; ++y) {
+      png_write_row(writer.png(), rgb.data() + std::size_t{3} * width * y);
+    }
+    png_write_end(writer.png(), writer.info());
+  }
+  core::write_file_atomically(path, bytes);
+}
+
+std::vector<std::uint8_t> tone_mapped(const Image& image, float exposure_stops) {
+  const float scale = std::exp2(exposure_stops);
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(image.pixels.size() * 3);
+  for (const glm::vec3& pixel : image.pixels) {
+    for (int c = 0; c < 3; ++c) {
+      const float value = pixel[c] * scale;
+      const float shown = value > 0 ? srgb_encoded(rolled_off(value)) : 0;  // NaN is not above 0
+      rgb.push_back(static_cast<std::uint8_t>(std::lround(255 * std::fmin(shown, 1.0f))));
+    }
+  }
+  return rgb;
+}
+
+float automatic_exposure(const Image& image) {
+  double sum = 0;
+  std::size_t lit = 0;
+  for (const glm::vec3& pixel : image.pixels) {
+    const float value = luminance(pixel);
+    if (value > 0 && std::isfinite(value)) {
+      sum += value;
+      ++lit;
+    }
+  }
+  constexpr double kMiddleGrey = 0.25;
+  return lit == 0 ? 0 : static_cast<float>(std::log2(kMiddleGrey * static_cast<double>(lit) / sum));
+}
+
+}  // namespace weft::render
