@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include "fabric/tile.h"
@@ -28,10 +29,13 @@ struct Hit {
 // The capsules of one tile, endlessly repeated in x and y, as an Embree scene. Rays that start
 // inside a capsule do not see that capsule's exit: only entries count in closest() (transport);
 // occluded() counts any overlap at the start as blocked (visibility). Immutable: any thread may
-// call.
+// call. Results do not depend on the caller's floating-point mode, and shifting a ray by whole
+// tiles changes them only by the rounding of its origin.
 class Scene {
  public:
-  // Keeps a reference to `tile`, which must outlive the scene.
+  // Keeps a reference to `tile`, which must outlive the scene. Throws core::Error(kInvalidArgument)
+  // when the tile is empty or so much smaller than its fibres that its copies fill the memory, and
+  // kResourceExhausted when Embree cannot build it.
   explicit Scene(const fabric::Tile& tile);
   ~Scene();
   Scene(const Scene&) = delete;
@@ -42,8 +46,9 @@ class Scene {
   [[nodiscard]] const fabric::Tile& tile() const;
 
   // First fibre entered by the ray from `origin_mm` (any point of endless cloth) along unit
-  // `direction` before `t_max_mm`; fibres equal to `ignored` are skipped. Rays inside the slab
-  // [z_min, z_max] are followed through as many tiles as it takes.
+  // `direction` before `t_max_mm`; fibres equal to `ignored` (relative to the ray's own tile) are
+  // skipped. The ray is followed through as many tiles as it takes, up to kMaxLegs wraps: one that
+  // runs in the plane of the cloth and still meets nothing counts as escaped.
   [[nodiscard]] std::optional<Hit> closest(glm::vec3 origin_mm, glm::vec3 direction, float t_max_mm,
                                            const std::optional<StrandCopy>& ignored) const;
 
@@ -51,9 +56,18 @@ class Scene {
   [[nodiscard]] bool occluded(glm::vec3 origin_mm, glm::vec3 direction, float t_max_mm,
                               const std::optional<StrandCopy>& ignored) const;
 
-  // The copy of segment k's strand whose segment k has its midpoint in tile (0, 0), and that
-  // midpoint.
+  // The copy of segment k's strand whose segment k has its midpoint in tile (0, 0); that midpoint
+  // is tile().wrapped_midpoint(k).
   [[nodiscard]] StrandCopy own_copy(std::uint32_t segment) const;
+
+  // The tile that holds a point.
+  [[nodiscard]] glm::ivec2 tile_of(glm::vec3 point_mm) const;
+
+  // A copy named relative to tile (0, 0), named relative to `tile` instead: what a path does with
+  // hit.copy before it goes on from a hit point in another tile.
+  [[nodiscard]] StrandCopy seen_from(const StrandCopy& copy, glm::ivec2 tile) const;
+
+  static constexpr int kMaxLegs = 10000;
 
  private:
   struct State;
