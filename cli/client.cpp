@@ -1,0 +1,87 @@
+#include "cli/client.h"
+
+#include <random>
+
+#include <fmt/format.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+
+#include "core/error.h"
+#include "proto/limits.h"
+#include "proto/status.h"
+
+namespace weft::cli {
+
+namespace {
+
+// host:port with a port of 1 to 65535, or unix:/path. gRPC would take more and say less.
+void check_address(const std::string& address) {
+  const auto refuse = [&](const std::string& what) {
+    throw core::Error(core::Code::kInvalidArgument, "'" + address + "' is not an address: " + what +
+                                                        "; write host:port, like " +
+                                                        kDefaultCoordinator + ", or unix:/path");
+  };
+  if (address.rfind("unix:", 0) == 0) {
+    if (address.size() == 5) {
+      refuse("no path follows unix:");
+    }
+    return;
+  }
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0) {
+    refuse("it has no port");
+  }
+  const std::string port = address.substr(colon + 1);
+  if (port.empty() || port.size() > 5 ||
+      port.find_first_not_of("0123456789") != std::string::npos || std::stoul(port) < 1 ||
+      std::stoul(port) > 65535) {
+    refuse("its port is not a number from 1 to 65535");
+  }
+}
+
+}  // namespace
+
+void add_coordinator_option(CLI::App& command, std::string& address) {
+  address = kDefaultCoordinator;
+  command
+      .add_option("--coordinator", address, "Address of the coordinator: host:port or unix:/path")
+      ->envname("WEFT_COORDINATOR")
+      ->capture_default_str();
+}
+
+Client::Client(const std::string& address) : address_(address) {
+  check_address(address);
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
+  arguments.SetMaxSendMessageSize(v1::kMessageLimitBytes);
+  // A proxy between a person and a coordinator on the same machine is never meant.
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  jobs_ = v1::JobService::NewStub(channel_);
+  workers_ = v1::WorkersService::NewStub(channel_);
+  catalogue_ = v1::CatalogueService::NewStub(channel_);
+}
+
+void Client::check(const grpc::Status& status, const std::string& doing) const {
+  if (status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+      status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
+    throw core::Error(
+        core::Code::kUnavailable,
+        fmt::format("cannot {}: no coordinator answers at {} ({}); start one with 'weft up', or "
+                    "name another with --coordinator or WEFT_COORDINATOR",
+                    doing, address_, status.error_message()));
+  }
+  v1::throw_unless_ok(status, doing);
+}
+
+void Client::set_deadline(grpc::ClientContext& context, std::chrono::seconds from_now) {
+  const gpr_timespec after = gpr_time_from_seconds(from_now.count(), GPR_TIMESPAN);
+  context.set_deadline(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), after));
+}
+
+std::string new_request_id() {
+  std::random_device device;
+  return fmt::format("{:08x}{:08x}{:08x}{:08x}", device(), device(), device(), device());
+}
+
+}  // namespace weft::cli

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace weft::cli {
+
+// A published fabric: a name and a version number, or the latest.
+struct FabricReference {
+  std::string name;                      // [a-z0-9][a-z0-9_-]{0,63}
+  std::optional<std::uint64_t> version;  // from 1; nothing: the latest
+
+  bool operator==(const FabricReference&) const = default;
+};
+
+// Reads "silk", "silk@latest" or "silk@3"; nothing when `text` is none of them.
+[[nodiscard]] std::optional<FabricReference> parse_reference(std::string_view text);
+
+// The file that `reference` means: a path to a database, or a published version (parse_reference)
+// that is fetched from the coordinator at `coordinator` (host:port) into the local cache, unless it
+// is there already. What reads as a published version is never taken for a path; write ./silk for a
+// file of such a name. Throws core::Error: kNotFound when there is no such file, fabric or version,
+// kUnavailable when the coordinator does not answer.
+[[nodiscard]] std::filesystem::path resolve_fabric(const std::string& reference,
+                                                   const std::string& coordinator);
+
+// Where fetched databases are kept: $XDG_CACHE_HOME/weft/fabrics, else ~/.cache/weft/fabrics.
+[[nodiscard]] std::filesystem::path fabric_cache_folder();
+
+}  // namespace weft::cli

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "cli/client.h"
+#include "core/digest.h"
+
+namespace weft::cli {
+
+// The version that `reference` (silk, silk@3, silk@latest) means now. Throws
+// core::Error(kInvalidArgument, kNotFound or kUnavailable).
+[[nodiscard]] v1::Version find_version(Client& client, const std::string& reference);
+
+// What the version's file must hold. Throws core::Error(kDataLoss) when the answer has no digest.
+[[nodiscard]] core::Digest version_digest(const v1::Version& version);
+
+// Called with bytes that are here and bytes in all.
+using FetchReport = std::function<void(std::uint64_t, std::uint64_t)>;
+
+enum class FetchOutcome { kFetched, kWasThere };
+
+// Brings the version's file to `path`: written beside as PATH.DIGEST.part, gone on with at its
+// length when an earlier fetch was broken off, checked against its digest, renamed. A file at
+// `path` that is this very version already is kept. `report` may be empty. Throws core::Error:
+// kUnavailable when the coordinator stays away (what came is kept), kDataLoss when the bytes are
+// not the version's.
+FetchOutcome fetch_version(Client& client, const v1::Version& version,
+                           const std::filesystem::path& path, const FetchReport& report);
+
+}  // namespace weft::cli
