@@ -5,6 +5,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
+#include "shading/bcsdf.h"
+#include "shading/fibre_angle.h"  // fibre_frame
 #include "shading/fibre_material.h"
 
 namespace weft::shading {
@@ -15,21 +17,21 @@ struct BcsdfSample {
   float pdf;          // per solid angle; 0: no sample, the path ends
 };
 
-// Rows x = tangent, y = omega_o orthogonal to it, z = x cross y: omega_local = frame * omega. In
-// this frame (omega_o-space, Khungurn et al. 2017, section 4.3) phi_o = 0.
-[[nodiscard]] glm::mat3 fibre_frame(glm::vec3 tangent, glm::vec3 omega_o);
-
 // S = S_R + S_TT with the tables that evaluate and sample it fast. Directions are unit vectors that
 // point away from the fibre, in any frame whose x axis is the fibre's tangent; omega_i is the light
 // side (S is not reciprocal). Immutable after construction: any thread may call.
 class FibreBcsdf {
  public:
+  // REQUIRES: widths above 1e-3 rad, colours in [0, 1] (descriptions are checked before).
   explicit FibreBcsdf(const FibreMaterial& material);
   // The test lobe S = 1 / pi^2, sampled by cos^2(theta): every weight is 1 (a furnace for paths).
   [[nodiscard]] static FibreBcsdf furnace();
 
   [[nodiscard]] const FibreMaterial& material() const;
   [[nodiscard]] bool is_furnace() const;
+  // What the shared kernels need (bcsdf.h, gamma.h); its table lives as long as this object or a
+  // copy of it.
+  [[nodiscard]] const FibreLobes& lobes() const;
 
   // S in 1/sr, without the cosine.
   [[nodiscard]] glm::vec3 evaluate(glm::vec3 omega_i, glm::vec3 omega_o) const;

@@ -1,0 +1,271 @@
+#include "shading/fibre_bcsdf.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "shading/azimuth_table.h"
+#include "shading/bessel.h"
+#include "shading/lobe_normalisation.h"
+#include "shading/normal_quantile.h"
+
+namespace weft::shading {
+namespace {
+
+// Rows over theta_o, graded like the lobe table: row i belongs to |theta_o| = pi/2 (1 - (i/n)^2).
+constexpr int kRowCells = 1024;
+// No sample lies closer to the axis than this; the density per solid angle stays finite.
+constexpr float kCosineFloor = 1e-6f;
+const float kFurnaceValue = 1.0f / (kPi * kPi);
+
+// The Gaussian N(theta_i; -|theta_o|, beta) cut off at +-pi/2: the tails that are missing.
+struct TruncatedTails {
+  float low = 0;   // below -pi/2
+  float high = 0;  // above +pi/2
+};
+
+struct Row {
+  float share_r = 0;  // probability of the reflection lobe
+  TruncatedTails r;
+  TruncatedTails tt;
+  float plain_r = 0;  // adjoint moments, see lobe_normalisation.h
+  float schlick_r = 0;
+  float plain_tt = 0;
+  float schlick_tt = 0;
+};
+
+TruncatedTails tails(double theta_o, double beta) {
+  const double scale = 1 / (std::numbers::sqrt2 * beta);
+  TruncatedTails t;
+  t.low = static_cast<float>(0.5 * std::erfc((std::numbers::pi / 2 - theta_o) * scale));
+  t.high = static_cast<float>(0.5 * std::erfc((std::numbers::pi / 2 + theta_o) * scale));
+  return t;
+}
+
+double luminance(glm::dvec3 c) { return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z; }
+
+// Picking lobes by their adjoint albedos keeps the weights below 2 up to grazing angles, where
+// Fresnel's factor alone would give 13.
+float reflection_share(glm::dvec3 albedo_r, glm::dvec3 albedo_tt) {
+  const double r = luminance(albedo_r);
+  const double tt = luminance(albedo_tt);
+  if (tt <= 0) {
+    return 1.0f;
+  }
+  return r <= 0 ? 0.0f : static_cast<float>(std::clamp(r / (r + tt), 0.1, 0.9));
+}
+
+float mix_floats(float a, float b, float f) { return a + (b - a) * f; }
+
+TruncatedTails mix_tails(TruncatedTails a, TruncatedTails b, float f) {
+  return {mix_floats(a.low, b.low, f), mix_floats(a.high, b.high, f)};
+}
+
+// The angle of the truncated Gaussian at u, for theta_o of either sign.
+float sample_theta(const TruncatedTails& cut, float beta, float theta_o, float u) {
+  // By symmetry only theta_o >= 0 is tabulated: mirror both angles.
+  const float inside = 1 - cut.low - cut.high;
+  const float below = std::max(cut.low + u * inside, 0x1p-25f);
+  const float above = std::max(cut.high + (1 - u) * inside, 0x1p-25f);
+  const float x = below < above ? -normal_upper_quantile(below) : normal_upper_quantile(above);
+  const float mirrored = -std::abs(theta_o) + beta * x;
+  return std::clamp(theta_o < 0 ? -mirrored : mirrored, -kHalfPi, kHalfPi);
+}
+
+// Unit vector in the y-z plane that is phi_o = 0.
+glm::vec2 azimuth_axis(glm::vec3 omega_o, float cos_theta_o) {
+  return cos_theta_o < 1e-7f ? glm::vec2(1, 0) : glm::vec2(omega_o.y, omega_o.z) / cos_theta_o;
+}
+
+glm::vec3 direction(float sin_theta, float cos_theta, float phi, glm::vec2 axis) {
+  const float c = std::cos(phi) * cos_theta;
+  const float s = std::sin(phi) * cos_theta;
+  return {sin_theta, c * axis.x - s * axis.y, c * axis.y + s * axis.x};
+}
+
+}  // namespace
+
+struct FibreBcsdf::Tables {
+  explicit Tables(const FibreMaterial& m);
+
+  FibreMaterial material;
+  bool furnace = false;
+  std::vector<glm::vec2> norm;
+  std::vector<Row> rows;
+  AzimuthTable azimuth;
+  FibreLobes lobes;
+  float peak_r;   // 1 / (sqrt(2 pi) beta)
+  float peak_tt;  // 1 / (sqrt(2 pi) beta)
+
+  [[nodiscard]] Row row(float pole) const;
+  // The density that sample() draws from, times cos(theta_i).
+  [[nodiscard]] float density_cos(const Row& row, float theta_sum, float azimuth_density) const;
+};
+
+FibreBcsdf::Tables::Tables(const FibreMaterial& m)
+    : material(m), azimuth(1.0 / (static_cast<double>(m.gamma_tt) * m.gamma_tt)) {
+  const double half_pi = std::numbers::pi / 2;
+  const double root_two_pi = std::sqrt(2 * std::numbers::pi);
+  const double beta_r = m.beta_r;
+  const double beta_tt = m.beta_tt;
+  peak_r = static_cast<float>(1 / (root_two_pi * beta_r));
+  peak_tt = static_cast<float>(1 / (root_two_pi * beta_tt));
+  norm.resize(kLobeTableCells + 1);
+  for (std::size_t i = 0; i < norm.size(); ++i) {
+    const double t = static_cast<double>(i) / kLobeTableCells;
+    const double theta = half_pi * (1 - t * t);
+    norm[i] = {static_cast<float>(root_two_pi * beta_r * lobe_normalisation(theta, beta_r)),
+               static_cast<float>(root_two_pi * beta_tt * lobe_normalisation(theta, beta_tt))};
+  }
+  const glm::dvec3 c_r = m.c_r;
+  const glm::dvec3 c_tt = m.c_tt;
+  rows.resize(kRowCells + 1);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double t = static_cast<double>(i) / kRowCells;
+    const double theta = half_pi * (1 - t * t);
+    const AdjointMoments r = adjoint_moments(theta, beta_r);
+    const AdjointMoments tt = adjoint_moments(theta, beta_tt);
+    Row& row_i = rows[i];
+    row_i.share_r = reflection_share(c_r * r.plain + (1.0 - c_r) * r.schlick,
+                                     c_tt * (1.0 - c_r) * (tt.plain - tt.schlick));
+    row_i.r = tails(theta, beta_r);
+    row_i.tt = tails(theta, beta_tt);
+    row_i.plain_r = static_cast<float>(r.plain);
+    row_i.schlick_r = static_cast<float>(r.schlick);
+    row_i.plain_tt = static_cast<float>(tt.plain);
+    row_i.schlick_tt = static_cast<float>(tt.schlick);
+  }
+  lobes.c_r = m.c_r;
+  lobes.c_tt = m.c_tt;
+  lobes.precision_r = static_cast<float>(1 / (beta_r * beta_r));
+  lobes.precision_tt = static_cast<float>(1 / (beta_tt * beta_tt));
+  lobes.kappa_tt = 1 / (m.gamma_tt * m.gamma_tt);
+  lobes.azimuth_norm = 1 / (kTwoPi * bessel_i0e(lobes.kappa_tt));
+  lobes.table = norm.data();
+}
+
+Row FibreBcsdf::Tables::row(float pole) const {
+  const float t = std::sqrt(std::clamp(pole, 0.0f, kHalfPi) * (1 / kHalfPi)) * kRowCells;
+  const int i = std::min(static_cast<int>(t), kRowCells - 1);
+  const float f = t - static_cast<float>(i);
+  const Row& a = rows[static_cast<std::size_t>(i)];
+  const Row& b = rows[static_cast<std::size_t>(i) + 1];
+  return {mix_floats(a.share_r, b.share_r, f),
+          mix_tails(a.r, b.r, f),
+          mix_tails(a.tt, b.tt, f),
+          mix_floats(a.plain_r, b.plain_r, f),
+          mix_floats(a.schlick_r, b.schlick_r, f),
+          mix_floats(a.plain_tt, b.plain_tt, f),
+          mix_floats(a.schlick_tt, b.schlick_tt, f)};
+}
+
+float FibreBcsdf::Tables::density_cos(const Row& at, float theta_sum, float azimuth_density) const {
+  const float half_d2 = 0.5f * theta_sum * theta_sum;
+  const float r = peak_r * std::exp(-half_d2 * lobes.precision_r) / (1 - at.r.low - at.r.high);
+  const float tt = peak_tt * std::exp(-half_d2 * lobes.precision_tt) / (1 - at.tt.low - at.tt.high);
+  return at.share_r * r * (1 / kTwoPi) + (1 - at.share_r) * tt * azimuth_density;
+}
+
+FibreBcsdf::FibreBcsdf(const FibreMaterial& material)
+    : tables_(std::make_shared<const Tables>(material)) {}
+
+FibreBcsdf FibreBcsdf::furnace() {
+  auto tables = std::make_shared<Tables>(FibreMaterial{});
+  tables->furnace = true;
+  FibreBcsdf result;
+  result.tables_ = std::move(tables);
+  return result;
+}
+
+const FibreMaterial& FibreBcsdf::material() const { return tables_->material; }
+bool FibreBcsdf::is_furnace() const { return tables_->furnace; }
+const FibreLobes& FibreBcsdf::lobes() const { return tables_->lobes; }
+
+glm::vec3 FibreBcsdf::evaluate(glm::vec3 omega_i, glm::vec3 omega_o) const {
+  if (tables_->furnace) {
+    return glm::vec3(kFurnaceValue);
+  }
+  return bcsdf(tables_->lobes, omega_i, omega_o);
+}
+
+glm::vec3 FibreBcsdf::evaluate_cos(glm::vec3 omega_i, glm::vec3 omega_o) const {
+  const float cos_theta_i = std::sqrt(omega_i.y * omega_i.y + omega_i.z * omega_i.z);
+  return evaluate(omega_i, omega_o) * cos_theta_i;
+}
+
+BcsdfSample FibreBcsdf::sample(glm::vec3 omega_o, float u_lobe, float u_theta, float u_phi) const {
+  const Tables& t = *tables_;
+  const FibreAngle o = fibre_angle(omega_o);
+  const glm::vec2 axis = azimuth_axis(omega_o, o.cos_theta);
+  BcsdfSample result{};
+  if (t.furnace) {
+    // The first coordinate of a uniform point of the disc has density (2 / pi) cos(asin x).
+    const float x = std::sqrt(u_theta) * std::cos(kTwoPi * u_lobe);
+    const float c = std::max(std::sqrt(std::max(0.0f, 1 - x * x)), kCosineFloor);
+    result.omega_i = direction(x, c, kTwoPi * u_phi, axis);
+    result.weight = glm::vec3(1);
+    result.pdf = c * kFurnaceValue;
+    return result;
+  }
+  const Row row = t.row(o.pole);
+  const bool reflect = u_lobe < row.share_r;
+  FibreAngle i;
+  i.theta = sample_theta(reflect ? row.r : row.tt, reflect ? t.material.beta_r : t.material.beta_tt,
+                         o.theta, u_theta);
+  i.pole = std::max(kHalfPi - std::abs(i.theta), kCosineFloor);
+  i.sin_theta = std::sin(i.theta);
+  i.cos_theta = std::sin(i.pole);
+  float v;  // phi_i - phi_o - pi
+  float azimuth_density;
+  if (reflect) {
+    v = kTwoPi * u_phi - kPi;
+    azimuth_density = t.azimuth.density(v);
+  } else {
+    const AzimuthTable::Sample drawn = t.azimuth.sample(u_phi);
+    v = drawn.v;
+    azimuth_density = drawn.density;
+  }
+  const float cos_v = std::cos(v);
+  const float sin_v = std::sin(v);
+  result.omega_i = {i.sin_theta, i.cos_theta * (sin_v * axis.y - cos_v * axis.x),
+                    -i.cos_theta * (sin_v * axis.x + cos_v * axis.y)};
+  const LobePair s = bcsdf_lobes(t.lobes, i, o, -cos_v);
+  const float density = t.density_cos(row, i.theta + o.theta, azimuth_density);
+  if (!(density > 0)) {
+    return result;
+  }
+  result.pdf = density / i.cos_theta;
+  result.weight = (s.r + s.tt) * (i.cos_theta / result.pdf);
+  return result;
+}
+
+float FibreBcsdf::pdf(glm::vec3 omega_i, glm::vec3 omega_o) const {
+  const Tables& t = *tables_;
+  const FibreAngle i = fibre_angle(omega_i);
+  const float cos_theta_i = std::max(i.cos_theta, kCosineFloor);
+  if (t.furnace) {
+    return cos_theta_i * kFurnaceValue;
+  }
+  const FibreAngle o = fibre_angle(omega_o);
+  // v from the half angle, sin^2(v / 2) = (1 + cos phi) / 2, stable about v = 0.
+  const float cos_phi = cos_phi_between(omega_i, i, omega_o, o);
+  const float s = std::sqrt(0.5f * (1 + cos_phi));
+  const float c = std::sqrt(0.5f * (1 - cos_phi));
+  const float v = s < c ? 2 * asin_acute(std::min(s, 0.70710678f))
+                        : kPi - 2 * asin_acute(std::min(c, 0.70710678f));
+  return t.density_cos(t.row(o.pole), i.theta + o.theta, t.azimuth.density(v)) / cos_theta_i;
+}
+
+glm::vec3 FibreBcsdf::adjoint_albedo(float theta_o) const {
+  if (tables_->furnace) {
+    return glm::vec3(1);
+  }
+  const Row row = tables_->row(kHalfPi - std::abs(theta_o));
+  const glm::vec3 c_r = tables_->material.c_r;
+  const glm::vec3 one(1);
+  return c_r * row.plain_r + (one - c_r) * row.schlick_r +
+         tables_->material.c_tt * (one - c_r) * (row.plain_tt - row.schlick_tt);
+}
+
+}  // namespace weft::shading
