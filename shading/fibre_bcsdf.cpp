@@ -45,7 +45,7 @@ TruncatedTails tails(double theta_o, double beta) {
 
 double luminance(glm::dvec3 c) { return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z; }
 
-// Picking lobes by their adjoint albedos keeps the weights below 2 up to grazing angles, where
+// Picking lobes by their adjoint albedos keeps the weights below 3 up to grazing angles, where
 // Fresnel's factor alone would give 13.
 float reflection_share(glm::dvec3 albedo_r, glm::dvec3 albedo_tt) {
   const double r = luminance(albedo_r);
