@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "fabric/ply.h"
+
 namespace weft::fabric {
 namespace {
 
@@ -31,16 +33,17 @@ void expand_yarn(v1::Yarn& yarn) {
     yarn.set_fibres_per_ply(kDefaultFibresPerPly);
   }
   const double radius_mm = yarn.yarn_radius_mm();
-  if (yarn.fibre_radius_mm() == 0) {
-    const double fibres = static_cast<double>(yarn.plies()) * yarn.fibres_per_ply();
-    yarn.set_fibre_radius_mm(radius_mm * std::sqrt(kDefaultPacking / fibres));
+  fill(yarn, &v1::Yarn::has_ply_aspect, &v1::Yarn::set_ply_aspect, 1);
+  if (yarn.fibre_radius_mm() == 0 && yarn.ply_aspect() > 0 && yarn.ply_aspect() <= 1) {
+    const PlySection ply = ply_section(yarn.plies(), yarn.ply_aspect());
+    const double share = kDefaultPacking * ply.radial * ply.tangential / yarn.fibres_per_ply();
+    yarn.set_fibre_radius_mm(radius_mm * std::sqrt(share));
   }
   const double ply_radius_mm = yarn.plies() > 1 ? radius_mm / 2 : radius_mm;
   const double ply_twist = yarn.plies() > 1 ? turns_per_cm(kDefaultPlyAngleDeg, radius_mm) : 0;
   fill(yarn, &v1::Yarn::has_ply_twist_per_cm, &v1::Yarn::set_ply_twist_per_cm, ply_twist);
   fill(yarn, &v1::Yarn::has_fibre_twist_per_cm, &v1::Yarn::set_fibre_twist_per_cm,
        -turns_per_cm(kDefaultFibreAngleDeg, ply_radius_mm));
-  fill(yarn, &v1::Yarn::has_ply_aspect, &v1::Yarn::set_ply_aspect, 1);
   fill(yarn, &v1::Yarn::has_flattening, &v1::Yarn::set_flattening, 0.3);
   v1::Migration& migration = *yarn.mutable_migration();
   using Migration = v1::Migration;

@@ -7,7 +7,7 @@ namespace weft::fabric {
 // What a yarn without a preset takes for the fields that it leaves out.
 inline constexpr std::uint32_t kDefaultPlies = 1;
 inline constexpr std::uint32_t kDefaultFibresPerPly = 40;
-inline constexpr double kDefaultPacking = 0.5;       // fibre area over the yarn's section
+inline constexpr double kDefaultPacking = 0.5;       // fibre area over its ply's section
 inline constexpr double kDefaultFibreAngleDeg = 15;  // of surface fibres to the ply's axis
 inline constexpr double kDefaultPlyAngleDeg = 20;    // of the plies to the yarn's axis
 inline constexpr double kDefaultSegmentLengthRadii = 8;

@@ -1,0 +1,106 @@
+#include "fabric/build.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "fabric/explicit_fibres.h"
+#include "fabric/fibres.h"
+#include "fabric/layout.h"
+#include "fabric/thread_path.h"
+
+namespace weft::fabric {
+
+namespace {
+
+std::string millions(std::uint64_t count) {
+  const std::string tenths = std::to_string((count + 50000) / 100000);
+  return tenths.size() < 2 ? "0." + tenths
+                           : tenths.substr(0, tenths.size() - 1) + "." + tenths.back();
+}
+
+void refuse_if_too_large(const TileEstimate& estimate) {
+  if (estimate.memory_bytes > kTileLimitBytes) {
+    throw core::Error(
+        core::Code::kResourceExhausted,
+        "the tile would have " + std::to_string(estimate.fibres) + " fibres, " +
+            millions(estimate.segments) + " million segments and need " +
+            std::to_string((estimate.memory_bytes >> 20U) + 1) + " MiB, more than the limit of " +
+            std::to_string(kTileLimitBytes >> 20U) +
+            " MiB; crop the draft, repeat it less often, lower exemplar.fibre_share or raise "
+            "exemplar.segment_length_radii");
+  }
+}
+
+// Number of each curve among those of its role.
+std::uint32_t next_index(std::map<Role, std::uint32_t>& counts, Role role) {
+  return counts[role]++;
+}
+
+std::uint32_t material_index(Tile& tile, const std::string& name) {
+  const auto found = std::find(tile.material_names.begin(), tile.material_names.end(), name);
+  if (found == tile.material_names.end()) {
+    tile.material_names.push_back(name);
+    return static_cast<std::uint32_t>(tile.material_names.size() - 1);
+  }
+  return static_cast<std::uint32_t>(found - tile.material_names.begin());
+}
+
+void lay_threads(const v1::FabricDescription& description, const YarnLayout& layout, Tile& tile) {
+  std::vector<std::optional<YarnModel>> models(static_cast<std::size_t>(description.yarns_size()));
+  std::map<Role, std::uint32_t> counts;
+  for (const YarnCurve& curve : layout.curves) {
+    const v1::Yarn& yarn = description.yarns(static_cast<int>(curve.yarn));
+    std::optional<YarnModel>& model = models[curve.yarn];
+    if (!model) {
+      model = yarn_model(yarn, description.exemplar());
+    }
+    const ThreadPath path(curve, layout.size_mm);
+    const auto thread = static_cast<std::uint32_t>(tile.threads.size());
+    tile.threads.push_back({curve.yarn, curve.role, next_index(counts, curve.role)});
+    lay_fibres({yarn, *model, path, description.exemplar().segment_length_radii(), curve.period,
+                thread, material_index(tile, yarn.material()), description.seed()},
+               tile);
+  }
+}
+
+void bound_height(Tile& tile) {
+  tile.z_min_mm = std::numeric_limits<float>::max();
+  tile.z_max_mm = std::numeric_limits<float>::lowest();
+  for (const Strand& strand : tile.strands) {
+    for (std::uint32_t p = 0; p < strand.point_count; ++p) {
+      const float z = tile.points_mm[strand.first_point + p].z;
+      tile.z_min_mm = std::min(tile.z_min_mm, z - strand.radius_mm);
+      tile.z_max_mm = std::max(tile.z_max_mm, z + strand.radius_mm);
+    }
+  }
+}
+
+}  // namespace
+
+Tile build_tile(const v1::FabricDescription& description) {
+  refuse_if_too_large(estimate_tile(description));
+  Tile tile;
+  for (const v1::Yarn& yarn : description.yarns()) {
+    tile.yarn_names.push_back(yarn.name());
+  }
+  if (description.has_explicit_fibres()) {
+    place_explicit_fibres(description, tile);
+  } else {
+    const glm::uvec2 repeats{description.exemplar().repeats_x(),
+                             description.exemplar().repeats_y()};
+    const YarnLayout layout = repeat_layout(lay_out(description), repeats);
+    tile.size_mm = glm::vec2(layout.size_mm);
+    tile.blocks = repeats;
+    lay_threads(description, layout, tile);
+  }
+  bound_height(tile);
+  index_segments(tile);
+  return tile;
+}
+
+}  // namespace weft::fabric

@@ -1,0 +1,17 @@
+#include "fabric/layout.h"
+
+#include "core/error.h"
+#include "fabric/weave_layout.h"
+
+namespace weft::fabric {
+
+YarnLayout lay_out(const v1::FabricDescription& description) {
+  if (description.has_weave()) {
+    return lay_out_weave(description);
+  }
+  throw core::Error(core::Code::kInvalidArgument,
+                    "the description has no structure; give a weave, yarn curves or explicit "
+                    "fibres");
+}
+
+}  // namespace weft::fabric
