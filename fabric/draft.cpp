@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "fabric/wif.h"
 
 namespace weft::fabric {
 namespace {
@@ -195,6 +196,12 @@ Draft draft_of(const v1::Weave& weave) {
   ColouredDraft coloured;
   if (weave.has_matrix()) {
     coloured = from_matrix(weave.matrix());
+  } else if (weave.has_wif_text()) {
+    WifDraft wif = read_wif(weave.wif_text(), "the draft");
+    coloured = {wif.warp.count, wif.weft.count, std::move(wif.up), std::move(wif.warp.colours),
+                std::move(wif.weft.colours)};
+  } else if (weave.has_wif_file()) {
+    refuse("the draft is still a file, " + weave.wif_file() + "; load the description from a file");
   } else {
     refuse("the weave has no draft; give a matrix or a wif_file");
   }

@@ -1,0 +1,335 @@
+#include "fabric/wif_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/error.h"
+
+namespace weft::fabric {
+namespace {
+
+constexpr std::uint32_t kMaxKey = 1U << 24;
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\f' || c == '\v' || c == '\0'; }
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && is_blank(text.front())) {
+    text.remove_prefix(1);
+  }
+  while (!text.empty() && is_blank(text.back())) {
+    text.remove_suffix(1);
+  }
+  return text;
+}
+
+char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
+
+// Upper case, runs of blanks as one, and the American spelling.
+std::string normalized(std::string_view text) {
+  std::string result;
+  for (const char c : trimmed(text)) {
+    if (is_blank(c)) {
+      if (result.back() != ' ') {
+        result += ' ';
+      }
+    } else {
+      result += upper(c);
+    }
+  }
+  for (std::size_t at = result.find("COLOUR"); at != std::string::npos;
+       at = result.find("COLOUR", at)) {
+    result.replace(at, 6, "COLOR");
+  }
+  return result;
+}
+
+bool is_free_text(const std::string& section) {
+  return section == "TEXT" || section == "NOTES" || section == "WIF";
+}
+
+// UTF-16 with a byte order mark as Latin text; anything else unchanged.
+std::string decoded(std::string_view text, bool& was_utf16) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  was_utf16 = text.size() >= 2 &&
+              ((byte(0) == 0xff && byte(1) == 0xfe) || (byte(0) == 0xfe && byte(1) == 0xff));
+  if (!was_utf16) {
+    constexpr std::string_view kMark = "\xef\xbb\xbf";
+    return std::string(text.starts_with(kMark) ? text.substr(kMark.size()) : text);
+  }
+  const std::size_t low = byte(0) == 0xff ? 0 : 1;
+  std::string result;
+  result.reserve(text.size() / 2);
+  for (std::size_t i = 2; i + 1 < text.size(); i += 2) {
+    const char c = text[i + low];
+    result += byte(i + 1 - low) == 0 && byte(i + low) < 0x80 ? c : '?';
+  }
+  return result;
+}
+
+// A value as it may be repeated in a message: short and printable.
+std::string shown(std::string_view text) {
+  constexpr std::size_t kMost = 40;
+  std::string result = "\"";
+  for (const char c : text.substr(0, kMost)) {
+    result += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+  }
+  return result + (text.size() > kMost ? "...\"" : "\"");
+}
+
+template <class T>
+std::optional<T> parsed(std::string_view text) {
+  if (text.starts_with('+')) {
+    text.remove_prefix(1);
+  }
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+}  // namespace
+
+std::string bracketed(std::string_view section) {
+  std::string result = "[";
+  return result.append(section).append("]");
+}
+
+std::string number_of(std::size_t count, const std::string& thing) {
+  return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
+}
+
+const WifEntry* WifSection::find(std::string_view key) const {
+  const auto found = std::find_if(entries.begin(), entries.end(),
+                                  [&](const WifEntry& entry) { return entry.key == key; });
+  return found == entries.end() ? nullptr : &*found;
+}
+
+WifFile::WifFile(std::string_view text, std::string name) : name_(std::move(name)) {
+  if (text.size() > kMaxWifBytes) {
+    fail(1, "the file has " + std::to_string(text.size()) + " bytes; a draft has at most " +
+                std::to_string(kMaxWifBytes));
+  }
+  bool was_utf16 = false;
+  const std::string plain = decoded(text, was_utf16);
+  if (was_utf16) {
+    note("the file is UTF-16; it was read as plain text");
+  }
+  std::uint32_t number = 0;
+  for (std::size_t at = 0; at < plain.size();) {
+    std::size_t end = plain.find_first_of("\r\n", at);
+    end = end == std::string::npos ? plain.size() : end;
+    if (++number > kMaxWifLines) {
+      fail(number, "more than " + std::to_string(kMaxWifLines) + " lines; this is no draft");
+    }
+    read_line(trimmed(std::string_view(plain).substr(at, end - at)), number);
+    at = end + (plain.compare(end, 2, "\r\n") == 0 ? 2 : 1);
+  }
+  if (sections_.empty()) {
+    fail(1, "the file has no [SECTION]; this is no weaving draft in WIF format");
+  }
+  merge_repeated_keys();
+}
+
+const WifSection* WifFile::find(std::string_view section) const {
+  const auto found =
+      std::find_if(sections_.begin(), sections_.end(),
+                   [&](const WifSection& candidate) { return candidate.name == section; });
+  return found == sections_.end() ? nullptr : &*found;
+}
+
+bool WifFile::has_entries(std::string_view section) const {
+  const WifSection* found = find(section);
+  return found != nullptr && !found->entries.empty();
+}
+
+const WifSection& WifFile::required(std::string_view section, const std::string& mend) const {
+  const WifSection* found = find(section);
+  if (found == nullptr) {
+    fail(1, bracketed(section) + " is missing; " + mend);
+  }
+  if (found->entries.empty()) {
+    fail(*found, found->line, "is empty; " + mend);
+  }
+  return *found;
+}
+
+std::uint32_t WifFile::stated_count(std::string_view section, std::string_view key,
+                                    std::uint32_t limit, std::uint32_t& line) const {
+  const WifSection* found = find(section);
+  const WifEntry* entry = found != nullptr ? found->find(key) : nullptr;
+  if (entry == nullptr || entry->value.empty()) {
+    return 0;
+  }
+  line = entry->line;
+  return whole_number(*found, *entry, limit);
+}
+
+void WifFile::note(std::string what) {
+  if (notes_.size() < kMaxWifNotes) {
+    notes_.push_back(std::move(what));
+  } else if (notes_.size() == kMaxWifNotes) {
+    notes_.emplace_back("more was repaired than is listed here");
+  }
+}
+
+void WifFile::fail(const WifSection& section, std::uint32_t line, const std::string& what) const {
+  fail(line, bracketed(section.name) + " " + what);
+}
+
+void WifFile::fail(std::uint32_t line, const std::string& what) const {
+  throw core::Error(core::Code::kInvalidArgument, name_ + ":" + std::to_string(line) + ": " + what);
+}
+
+void WifFile::open_section(std::string_view line, std::uint32_t number) {
+  const std::size_t close = line.find(']');
+  if (close == std::string_view::npos) {
+    fail(number, "the section name " + shown(line) + " has no closing bracket; write [NAME]");
+  }
+  std::string name = normalized(line.substr(1, close - 1));
+  if (name.empty()) {
+    fail(number, "a section has no name; write [NAME]");
+  }
+  const auto found = std::find_if(sections_.begin(), sections_.end(),
+                                  [&](const WifSection& s) { return s.name == name; });
+  current_ = static_cast<std::size_t>(found - sections_.begin());
+  if (found != sections_.end()) {
+    note(bracketed(name) + " stands twice, at lines " + std::to_string(found->line) + " and " +
+         std::to_string(number) + "; both were read");
+    return;
+  }
+  constexpr std::size_t kMaxSections = 1000;
+  if (sections_.size() >= kMaxSections) {
+    fail(number, "more than 1000 sections; this is no weaving draft");
+  }
+  sections_.push_back({std::move(name), number, {}});
+}
+
+void WifFile::read_line(std::string_view line, std::uint32_t number) {
+  if (line.empty() || line.front() == ';' || line.front() == '#') {
+    return;
+  }
+  if (line.front() == '[') {
+    open_section(line, number);
+    return;
+  }
+  const std::size_t equals = line.find('=');
+  if (sections_.empty()) {
+    fail(number, shown(line) + " stands before the first [SECTION]; a WIF file begins with [WIF]");
+  }
+  WifSection& section = sections_[current_];
+  if (equals == std::string_view::npos) {
+    if (!is_free_text(section.name)) {
+      section.entries.push_back({"", std::string(line), number});
+    }
+    return;
+  }
+  std::string_view value = line.substr(equals + 1);
+  if (!is_free_text(section.name)) {
+    value = value.substr(0, value.find(';'));
+  }
+  section.entries.push_back(
+      {normalized(line.substr(0, equals)), std::string(trimmed(value)), number});
+}
+
+void WifFile::merge_repeated_keys() {
+  for (WifSection& section : sections_) {
+    std::map<std::string, std::size_t> places;
+    std::vector<WifEntry> kept;
+    kept.reserve(section.entries.size());
+    for (WifEntry& entry : section.entries) {
+      const auto [place, fresh] = places.try_emplace(entry.key, kept.size());
+      if (fresh || entry.key.empty()) {
+        kept.push_back(std::move(entry));
+      } else {
+        WifEntry& before = kept[place->second];
+        if (before.value != entry.value && !is_free_text(section.name)) {
+          note(bracketed(section.name) + " " + entry.key + " stands twice, at lines " +
+               std::to_string(before.line) + " and " + std::to_string(entry.line) +
+               "; the last one counts");
+        }
+        before = std::move(entry);
+      }
+    }
+    section.entries = std::move(kept);
+  }
+}
+
+bool WifFile::boolean(const WifSection& section, const WifEntry& entry, bool otherwise) const {
+  const std::string value = normalized(entry.value);
+  if (value.empty()) {
+    return otherwise;
+  }
+  for (const char* yes : {"TRUE", "YES", "ON", "1", "T", "Y"}) {
+    if (value == yes) {
+      return true;
+    }
+  }
+  for (const char* no : {"FALSE", "NO", "OFF", "0", "F", "N"}) {
+    if (value == no) {
+      return false;
+    }
+  }
+  fail(section, entry.line, entry.key + " is " + shown(entry.value) + "; write true or false");
+}
+
+double WifFile::number(const WifSection& section, const WifEntry& entry) const {
+  std::string text = entry.value;
+  std::replace(text.begin(), text.end(), ',', '.');  // decimal comma
+  const std::optional<double> value = parsed<double>(text);
+  if (!value || !std::isfinite(*value)) {
+    fail(section, entry.line,
+         entry.key + " is " + shown(entry.value) + "; a number is needed, such as 0.212");
+  }
+  return *value;
+}
+
+std::vector<std::uint32_t> WifFile::whole_numbers(const WifSection& section, const WifEntry& entry,
+                                                  std::uint32_t limit) const {
+  std::vector<std::uint32_t> numbers;
+  std::string_view rest = entry.value;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find_first_of(", \t"), rest.size());
+    const std::string_view item = rest.substr(0, end);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (item.empty()) {
+      continue;
+    }
+    const std::optional<std::int64_t> value = parsed<std::int64_t>(item);
+    if (!value || *value < 0 || *value > limit) {
+      fail(section, entry.line,
+           entry.key + "=" + shown(entry.value) + ": " + shown(item) +
+               " is not a whole number from 0 to " + std::to_string(limit));
+    }
+    numbers.push_back(static_cast<std::uint32_t>(*value));
+  }
+  return numbers;
+}
+
+std::uint32_t WifFile::whole_number(const WifSection& section, const WifEntry& entry,
+                                    std::uint32_t limit) const {
+  const std::vector<std::uint32_t> numbers = whole_numbers(section, entry, limit);
+  if (numbers.size() != 1) {
+    fail(section, entry.line,
+         entry.key + " is " + shown(entry.value) + "; one whole number is needed");
+  }
+  return numbers.front();
+}
+
+std::uint32_t WifFile::key_number(const WifSection& section, const WifEntry& entry) const {
+  if (entry.key.empty()) {
+    fail(section, entry.line, shown(entry.value) + " has no '='; write number=value");
+  }
+  const std::optional<std::uint32_t> value = parsed<std::uint32_t>(entry.key);
+  if (!value || *value > kMaxKey) {
+    fail(section, entry.line,
+         shown(entry.key) + " is no number; the keys of this section are numbers from 1 on");
+  }
+  return *value;
+}
+
+}  // namespace weft::fabric
