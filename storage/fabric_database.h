@@ -44,7 +44,7 @@ struct FabricDatabase {
   std::uint32_t sh_order = 0;
   std::vector<std::uint64_t> cell_paths;  // [cells]
   std::vector<float> transfer;            // [cells, 3, (order+1)^2 (j1), (order+1)^2 (j0)]
-  std::vector<float> transfer_se;         // standard error, same shape (stored as half)
+  std::vector<float> transfer_se;         // standard error, same shape
 
   // /visibility
   std::uint32_t visibility_resolution = 0;  // rows theta (polar, from +z), columns phi
@@ -61,18 +61,26 @@ struct FabricDatabase {
 
   // /provenance
   std::string description_json;  // canonical description
+  std::string stages_json;       // settings, seeds and result digests of every stage
   std::string software;          // name and schema, never a date or a host
 };
 
-// Writes `database` as schema 1. The bytes depend on nothing but the contents. Written beside and
-// renamed. Returns the content digest, which the file's user block holds.
+// Writes `database` as schema 1. The bytes depend on nothing but the contents. Written beside,
+// verified and renamed: `path` holds the old file or the whole new one. Returns the content digest,
+// which the file's user block holds. Standard errors are stored as halves; transfer matrices too,
+// where rounding adds less than a tenth of their standard error, and as floats elsewhere. Throws
+// core::Error(kDataLoss) naming the dataset when the contents contradict each other.
 core::Digest write_database(const FabricDatabase& database, const std::filesystem::path& path);
 
-// Reads schema 1 with limits: throws core::Error(kDataLoss) naming the dataset on any damage, on
-// external links, external storage, virtual datasets and shapes larger than the file can hold.
+// Reads schema 1 with limits, after checking the digest: throws core::Error(kDataLoss) naming the
+// dataset on any damage, on links, external storage, virtual datasets, foreign filters, shapes
+// larger than the file can hold, counts that contradict each other, indices out of range and
+// numbers that are not finite; kNotFound when there is no file; kFailedPrecondition when its schema
+// is newer.
 [[nodiscard]] FabricDatabase read_database(const std::filesystem::path& path);
 
-// The digest in the user block, after checking it against the file. Throws core::Error(kDataLoss).
+// The digest in the user block, after checking it against the file and reading all of it. Throws as
+// read_database.
 core::Digest verify_database(const std::filesystem::path& path);
 
 // The digest in the user block, unchecked.

@@ -1,0 +1,176 @@
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "core/error.h"
+#include "core/half.h"
+#include "storage/database_fields.h"
+#include "storage/h5.h"
+#include "storage/user_block.h"
+
+namespace weft::storage {
+
+namespace {
+
+// Fills every field from a file.
+class FieldReader {
+ public:
+  explicit FieldReader(const std::filesystem::path& path) : file_(path) {}
+
+  template <class T>
+  void values(const char* path, T* first) {
+    const DatasetSpec& spec = dataset_spec(path);
+    const std::vector<T> data = take<T>(spec, info_of(spec));
+    std::copy(data.begin(), data.end(), first);
+  }
+
+  template <class T>
+  void array(const char* path, std::vector<T>& data) {
+    const DatasetSpec& spec = dataset_spec(path);
+    data = take<T>(spec, info_of(spec));
+  }
+
+  template <class Member>
+  void columns(const char* path, std::vector<shading::FibreMaterial>& materials, Member member) {
+    const DatasetSpec& spec = dataset_spec(path);
+    const std::vector<float> data = take<float>(spec, info_of(spec));
+    materials.resize(extents_.at("materials"));
+    const std::size_t width = data.size() / materials.size();
+    for (std::size_t i = 0; i < materials.size(); ++i) {
+      std::copy_n(data.data() + i * width, width, member(materials[i]));
+    }
+  }
+
+  // Floats that may be stored as halves.
+  void rounded(const char* path, std::vector<float>& data) {
+    const DatasetSpec& spec = dataset_spec(path);
+    const h5::Reader::Info info = info_of(spec, h5::Element::kF32);
+    if (info.element == h5::Element::kF32) {
+      data = take<float>(spec, info);
+      return;
+    }
+    const std::vector<std::uint16_t> halves = take<std::uint16_t>(spec, info);
+    data.resize(halves.size());
+    for (std::size_t i = 0; i < halves.size(); ++i) {
+      data[i] = core::float_from_half(halves[i]);
+    }
+  }
+
+  void derived(const char* path) {
+    std::vector<float> unused;
+    array(path, unused);
+  }
+
+  void texts(const char* path, std::vector<std::string>& data) {
+    const DatasetSpec& spec = dataset_spec(path);
+    std::ignore = info_of(spec);
+    data = file_.read_text(path);
+  }
+
+  void text(const char* path, std::string& data) {
+    std::vector<std::string> one;
+    texts(path, one);
+    data = std::move(one.front());
+  }
+
+  [[nodiscard]] const Extents& extents() const { return extents_; }
+
+ private:
+  h5::Reader::Info info_of(const DatasetSpec& spec) { return info_of(spec, spec.element); }
+
+  // Shape and element as the schema says; `other` is accepted as well.
+  h5::Reader::Info info_of(const DatasetSpec& spec, h5::Element other) {
+    h5::Reader::Info info = file_.info(spec.path);
+    if (info.element != spec.element && info.element != other) {
+      throw core::Error(core::Code::kDataLoss, std::string("dataset ") + spec.path +
+                                                   " has elements " + h5::to_string(info.element) +
+                                                   " where " + h5::to_string(spec.element) +
+                                                   " was expected; fetch or make the file again");
+    }
+    extents_.bind(spec, info.shape);
+    return info;
+  }
+
+  template <class T>
+  std::vector<T> take(const DatasetSpec& spec, const h5::Reader::Info& info) {
+    std::size_t count = 1;
+    for (const std::uint64_t extent : info.shape) {
+      count *= extent;
+    }
+    file_.admit(spec.path, info);
+    std::vector<T> data(count);
+    file_.read(spec.path, info, std::as_writable_bytes(std::span<T>(data)));
+    return data;
+  }
+
+  h5::Reader file_;
+  Extents extents_;
+};
+
+FabricDatabase read_contents(const std::filesystem::path& path) {
+  FabricDatabase database;
+  FieldReader reader(path);
+  exchange_fields(reader, database);
+  const std::uint64_t coefficients = reader.extents().at("coefficients");
+  const auto order = static_cast<std::uint64_t>(std::sqrt(static_cast<double>(coefficients))) - 1;
+  if ((order + 1) * (order + 1) != coefficients) {
+    throw core::Error(core::Code::kDataLoss,
+                      "dataset /iirtf/transfer is wrong: its number of coefficients is not a "
+                      "square; fetch or make the file again");
+  }
+  database.sh_order = static_cast<std::uint32_t>(order);
+  database.visibility_resolution = static_cast<std::uint32_t>(reader.extents().at("resolution"));
+  database.pca_components = static_cast<std::uint32_t>(reader.extents().at("components"));
+  database.sg_count = static_cast<std::uint32_t>(reader.extents().at("sg_count"));
+  check_values(database);
+  return database;
+}
+
+// The library's readers of damaged metadata are not to be trusted: nothing reaches them before the
+// digest holds.
+core::Digest check_digest(const std::filesystem::path& path) {
+  const UserBlock block = read_user_block(path);
+  if (core::digest_of_file(path, kUserBlockBytes) != block.digest) {
+    throw core::Error(core::Code::kDataLoss,
+                      path.string() +
+                          " is damaged: its bytes do not have the digest it was written with; "
+                          "fetch or make it again");
+  }
+  return block.digest;
+}
+
+template <class Function>
+auto naming_file(const std::filesystem::path& path, Function function) {
+  try {
+    return function();
+  } catch (const core::Error& error) {
+    const std::string what = error.what();
+    if (what.find(path.string()) != std::string::npos) {
+      throw;
+    }
+    throw core::Error(error.code(), path.string() + ": " + what);
+  }
+}
+
+}  // namespace
+
+FabricDatabase read_database(const std::filesystem::path& path) {
+  return naming_file(path, [&path] {
+    check_digest(path);
+    return read_contents(path);
+  });
+}
+
+core::Digest verify_database(const std::filesystem::path& path) {
+  return naming_file(path, [&path] {
+    const core::Digest digest = check_digest(path);
+    std::ignore = read_contents(path);
+    return digest;
+  });
+}
+
+core::Digest content_digest(const std::filesystem::path& path) {
+  return read_user_block(path).digest;
+}
+
+}  // namespace weft::storage
