@@ -1,6 +1,8 @@
 #include "fabric/build.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <optional>
@@ -17,22 +19,19 @@ namespace weft::fabric {
 
 namespace {
 
-std::string millions(std::uint64_t count) {
-  const std::string tenths = std::to_string((count + 50000) / 100000);
-  return tenths.size() < 2 ? "0." + tenths
-                           : tenths.substr(0, tenths.size() - 1) + "." + tenths.back();
-}
+constexpr double kMebibyte = 1048576;
 
 void refuse_if_too_large(const TileEstimate& estimate) {
   if (estimate.memory_bytes > kTileLimitBytes) {
-    throw core::Error(
-        core::Code::kResourceExhausted,
-        "the tile would have " + std::to_string(estimate.fibres) + " fibres, " +
-            millions(estimate.segments) + " million segments and need " +
-            std::to_string((estimate.memory_bytes >> 20U) + 1) + " MiB, more than the limit of " +
-            std::to_string(kTileLimitBytes >> 20U) +
-            " MiB; crop the draft, repeat it less often, lower exemplar.fibre_share or raise "
-            "exemplar.segment_length_radii");
+    std::array<char, 400> text{};
+    std::snprintf(text.data(), text.size(),
+                  "the tile would have %.3g fibres, %.3g segments and need %.3g MiB, more than the "
+                  "limit of %.0f MiB; crop the draft, repeat it less often, lower "
+                  "exemplar.fibre_share or raise exemplar.segment_length_radii",
+                  static_cast<double>(estimate.fibres), static_cast<double>(estimate.segments),
+                  static_cast<double>(estimate.memory_bytes) / kMebibyte,
+                  static_cast<double>(kTileLimitBytes) / kMebibyte);
+    throw core::Error(core::Code::kResourceExhausted, text.data());
   }
 }
 

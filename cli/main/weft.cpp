@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", "weft 0.1.0");
   // One line per command, in the order of commands.h.
+  cli::add_preview(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
