@@ -134,7 +134,9 @@ void Document::refuse_non_finite(const pb::Message& message, const std::string& 
       }
       here += field->name();
       if (field->is_repeated()) {
-        here += "[" + std::to_string(i) + "]";
+        here += '[';
+        here += std::to_string(i);
+        here += ']';
       }
       if (field->cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE) {
         refuse_non_finite(field->is_repeated() ? reflection.GetRepeatedMessage(message, field, i)

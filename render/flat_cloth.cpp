@@ -52,7 +52,7 @@ class FlatCloth : public Cloth {
     if (placement_.black_underlay && from_below) {
       return {Fate::kAbsorbed, passage->enter_mm, {}};
     }
-    const double start = std::max(0.0, passage->enter_mm);
+    const double start = std::max(0.0, start_of(*passage));
     const double end = std::min(passage->leave_mm, t_max_mm);
     std::optional<FibreHit> hit = fibre_between(ray, flat, start, end, from);
     if (hit) {
@@ -65,13 +65,15 @@ class FlatCloth : public Cloth {
   }
 
   [[nodiscard]] LocalMeeting closest_local(const Ray& ray, const FibreHit& from) const override {
-    const Ray flat = flat_ray(ray);
+    Ray flat = flat_ray(ray);
+    // A hit on the highest fibres may be rounded out of the cloth.
+    flat.origin_mm.z = std::clamp(flat.origin_mm.z, low_.z, high_.z);
     const std::optional<Passage> passage = passage_of(flat);
-    if (!passage) {  // grazes a face
+    if (!passage) {  // beyond a border
       return {};
     }
     const std::optional<FibreHit> hit =
-        fibre_between(ray, flat, std::max(0.0, passage->enter_mm), passage->leave_mm, &from);
+        fibre_between(ray, flat, std::max(0.0, start_of(*passage)), passage->leave_mm, &from);
     if (hit) {
       return {LocalFate::kFibre, hit->t_mm, *hit};
     }
@@ -106,6 +108,12 @@ class FlatCloth : public Cloth {
  private:
   [[nodiscard]] Ray flat_ray(const Ray& ray) const {
     return {to_flat_ * (ray.origin_mm - placement_.centre_mm), to_flat_ * ray.direction};
+  }
+
+  // The highest fibres touch the surface: a ray that began on it might begin inside them.
+  [[nodiscard]] double start_of(const Passage& passage) const {
+    return passage.enter_axis == 2 ? passage.enter_mm - 0.01 * (high_.z - low_.z)
+                                   : passage.enter_mm;
   }
 
   static bool leaves_below(const Passage& passage, const Ray& flat) {
