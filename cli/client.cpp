@@ -14,29 +14,27 @@ namespace weft::cli {
 
 namespace {
 
-// host:port with a port of 1 to 65535, or unix:/path. gRPC would take more and say less.
-void check_address(const std::string& address) {
-  const auto refuse = [&](const std::string& what) {
-    throw core::Error(core::Code::kInvalidArgument, "'" + address + "' is not an address: " + what +
-                                                        "; write host:port, like " +
-                                                        kDefaultCoordinator + ", or unix:/path");
+// host:port with a port of 1 to 65535, or unix:/path. gRPC would take more and say less. Returns
+// what is wrong, or nothing.
+std::string mistake_in_address(const std::string& address) {
+  const auto mistake = [&](const std::string& what) {
+    return "'" + address + "' is not an address: " + what + "; write host:port, like " +
+           kDefaultCoordinator + ", or unix:/path";
   };
   if (address.rfind("unix:", 0) == 0) {
-    if (address.size() == 5) {
-      refuse("no path follows unix:");
-    }
-    return;
+    return address.size() > 5 ? std::string() : mistake("no path follows unix:");
   }
   const std::size_t colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0) {
-    refuse("it has no port");
+    return mistake("it has no port");
   }
   const std::string port = address.substr(colon + 1);
   if (port.empty() || port.size() > 5 ||
       port.find_first_not_of("0123456789") != std::string::npos || std::stoul(port) < 1 ||
       std::stoul(port) > 65535) {
-    refuse("its port is not a number from 1 to 65535");
+    return mistake("its port is not a number from 1 to 65535");
   }
+  return "";
 }
 
 }  // namespace
@@ -46,11 +44,15 @@ void add_coordinator_option(CLI::App& command, std::string& address) {
   command
       .add_option("--coordinator", address, "Address of the coordinator: host:port or unix:/path")
       ->envname("WEFT_COORDINATOR")
+      ->check(CLI::Validator(mistake_in_address, "", "address"))
       ->capture_default_str();
 }
 
 Client::Client(const std::string& address) : address_(address) {
-  check_address(address);
+  const std::string mistake = mistake_in_address(address);
+  if (!mistake.empty()) {
+    throw core::Error(core::Code::kInvalidArgument, mistake);
+  }
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
   arguments.SetMaxSendMessageSize(v1::kMessageLimitBytes);
@@ -62,14 +64,25 @@ Client::Client(const std::string& address) : address_(address) {
   catalogue_ = v1::CatalogueService::NewStub(channel_);
 }
 
+bool Client::is_worth_repeating(const grpc::Status& status) {
+  return status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+         status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+}
+
 void Client::check(const grpc::Status& status, const std::string& doing) const {
-  if (status.error_code() == grpc::StatusCode::UNAVAILABLE ||
-      status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
+  if (is_worth_repeating(status)) {
     throw core::Error(
         core::Code::kUnavailable,
         fmt::format("cannot {}: no coordinator answers at {} ({}); start one with 'weft up', or "
                     "name another with --coordinator or WEFT_COORDINATOR",
                     doing, address_, status.error_message()));
+  }
+  if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED ||
+      status.error_code() == grpc::StatusCode::UNKNOWN) {
+    throw core::Error(core::Code::kUnavailable,
+                      fmt::format("cannot {}: what answers at {} is not a coordinator of this "
+                                  "weft ({}); name another with --coordinator",
+                                  doing, address_, status.error_message()));
   }
   v1::throw_unless_ok(status, doing);
 }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <CLI/CLI.hpp>
 #include <grpcpp/channel.h>
@@ -46,9 +47,33 @@ class Client {
     return response;
   }
 
+  // The same for a request that carries a request_id: while it is not known whether the call
+  // arrived, it is made again, a few times.
+  template <class Stub, class Request, class Response>
+  Response call_repeatedly(Stub& stub,
+                           grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                        Response*),
+                           const Request& request, const std::string& doing) const {
+    for (int tries_left = kTries; true; --tries_left) {
+      grpc::ClientContext context;
+      set_deadline(context, kCallDeadline);
+      Response response;
+      const grpc::Status status = (stub.*method)(&context, request, &response);
+      if (tries_left == 1 || !is_worth_repeating(status)) {
+        check(status, doing);
+        return response;
+      }
+      std::this_thread::sleep_for(kBetweenTries);
+    }
+  }
+
   static void set_deadline(grpc::ClientContext& context, std::chrono::seconds from_now);
 
  private:
+  static constexpr int kTries = 3;
+  static constexpr std::chrono::milliseconds kBetweenTries{300};
+  [[nodiscard]] static bool is_worth_repeating(const grpc::Status& status);
+
   std::string address_;
   std::shared_ptr<grpc::Channel> channel_;  // shared: gRPC's stubs ask for it
   std::unique_ptr<v1::JobService::Stub> jobs_;

@@ -23,6 +23,9 @@ bool is_running(const StageProgress& stage) { return stage.total > 0 && !is_fini
 
 // Shards computed per second; 0 when nothing has been computed yet.
 double rate_per_second(const StageProgress& stage) {
+  if (stage.shards_per_second) {
+    return *stage.shards_per_second;
+  }
   const double computed = static_cast<double>(stage.done - std::min(stage.cached, stage.done));
   return stage.seconds > 0 ? computed / stage.seconds : 0;
 }
@@ -151,6 +154,16 @@ void ProgressPrinter::update(const std::vector<StageProgress>& stages) {
       shown_at_seconds_ = now_seconds;
     }
   }
+  std::fflush(out_);
+}
+
+void ProgressPrinter::note(const std::string& text) {
+  if (is_terminal_ && lines_shown_ > 0) {
+    fmt::print(out_, "\x1b[{}A\x1b[J", lines_shown_);
+    lines_shown_ = 0;
+    shown_at_seconds_ = -1e9;
+  }
+  fmt::print(out_, "{}\n", text);
   std::fflush(out_);
 }
 

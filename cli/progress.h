@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,10 +13,11 @@ namespace weft::cli {
 // How far one stage of a job is. `total` is 0 until the stage is planned.
 struct StageProgress {
   std::string name;
-  std::uint64_t done = 0;    // shards finished, those found in the cache included
-  std::uint64_t total = 0;   // shards in all
-  std::uint64_t cached = 0;  // of `done`: taken from the cache, not computed
-  double seconds = 0;        // since the stage began; stops when it is finished
+  std::uint64_t done = 0;                     // shards finished, those found in the cache included
+  std::uint64_t total = 0;                    // shards in all
+  std::uint64_t cached = 0;                   // of `done`: taken from the cache, not computed
+  double seconds = 0;                         // since the stage began; stops when it is finished
+  std::optional<double> shards_per_second{};  // where it was measured; else done over seconds
 };
 
 // "0.4 s", "12 s", "3 min 20 s", "2 h 05 min".
@@ -44,6 +46,8 @@ class ProgressPrinter {
 
   // Shows `stages` if it is time to, and always when the set of finished stages has changed.
   void update(const std::vector<StageProgress>& stages);
+  // Prints a line of its own above the progress.
+  void note(const std::string& text);
   // Shows the last state and leaves it standing.
   void finish(const std::vector<StageProgress>& stages);
 

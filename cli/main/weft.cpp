@@ -16,6 +16,14 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "weft 0.1.0");
   // One line per command, in the order of commands.h.
   cli::add_preview(app);
+  cli::add_submit(app);
+  cli::add_jobs(app);
+  cli::add_watch(app);
+  cli::add_cancel(app);
+  cli::add_workers(app);
+  cli::add_fabrics(app);
+  cli::add_versions(app);
+  cli::add_fetch(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

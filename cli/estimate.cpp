@@ -1,0 +1,119 @@
+#include "cli/estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/progress.h"
+
+namespace weft::cli {
+
+namespace {
+
+// Measured with the prototype (one core, dense weaves): rays for visibility with Embree, signed
+// distance with projection, and paths of the transfer matrix.
+constexpr double kVisibilityRaysPerSecond = 1.2e6;
+constexpr double kCoefficientsSecondsPerSegment = 2e-3;
+constexpr double kPathsPerSecond = 5e4;
+// The mean free path of yarns is this much longer than that of fibres spread at random: fibres of a
+// yarn lie side by side, and a leg never meets its own fibre (1.3 to 2.4 measured).
+constexpr double kAlignedFibresFactor = 1.8;
+
+const v1::Yarn* find_yarn(const v1::FabricDescription& description, const std::string& name) {
+  for (const v1::Yarn& yarn : description.yarns()) {
+    if (yarn.name() == name) {
+      return &yarn;
+    }
+  }
+  return nullptr;
+}
+
+// Cells of a weave: volume over the cube of the cell's length, with 1/l = pi r L_v / 2 for the mean
+// free path of cylinders of radius r and length L_v per volume.
+std::optional<std::uint64_t> estimate_cells(const v1::FabricDescription& description,
+                                            const fabric::TileEstimate& tile) {
+  const v1::Weave& weave = description.weave();
+  const v1::Yarn* warp = find_yarn(description, weave.warp_yarn());
+  const v1::Yarn* weft = find_yarn(description, weave.weft_yarn());
+  if (!description.has_weave() || warp == nullptr || weft == nullptr) {
+    return std::nullopt;
+  }
+  const double volume_mm3 = 10 * tile.ends / weave.ends_per_cm() * 10 * tile.picks /
+                            weave.picks_per_cm() * 2 *
+                            (warp->yarn_radius_mm() + weft->yarn_radius_mm());
+  const double radius_mm = (warp->fibre_radius_mm() + weft->fibre_radius_mm()) / 2;
+  const double length_mm = static_cast<double>(tile.segments) *
+                           description.exemplar().segment_length_radii() * radius_mm;
+  const double mean_free_path_mm =
+      kAlignedFibresFactor * 2 * volume_mm3 / (std::numbers::pi * radius_mm * length_mm);
+  const double cell_mm = description.precompute().cell_length_mfp() * mean_free_path_mm;
+  const double cells = volume_mm3 / (cell_mm * cell_mm * cell_mm);
+  if (!std::isfinite(cells)) {
+    return std::nullopt;
+  }
+  return static_cast<std::uint64_t>(std::clamp(cells, 1.0, 1e12));
+}
+
+}  // namespace
+
+FabricEstimate estimate(const v1::FabricDescription& description) {
+  FabricEstimate result;
+  result.tile = fabric::estimate_tile(description);
+  result.cells = estimate_cells(description, result.tile);
+  const v1::Precompute& precompute = description.precompute();
+  const std::uint64_t pixels =
+      std::uint64_t{precompute.visibility_resolution()} * precompute.visibility_resolution();
+  const std::uint64_t order = precompute.sh_order() + 1;
+  // Per segment: halves of both representations, a point, the cell, rotation and open share. Per
+  // cell: mean and standard error in half precision. The basis in single precision.
+  const std::uint64_t bytes_per_segment =
+      2 * (std::uint64_t{precompute.pca_components()} + precompute.sg_count()) + 12 + 4 + 4;
+  result.database_bytes = result.tile.segments * bytes_per_segment +
+                          result.cells.value_or(0) * 3 * order * order * order * order * 4 +
+                          (precompute.pca_components() + 1) * pixels * 4;
+  result.core_seconds =
+      static_cast<double>(result.tile.segments) *
+          (static_cast<double>(pixels) / kVisibilityRaysPerSecond +
+           kCoefficientsSecondsPerSegment) +
+      static_cast<double>(result.cells.value_or(0)) * precompute.paths_per_cell() / kPathsPerSecond;
+  return result;
+}
+
+void print_estimate(const v1::FabricDescription& description, bool wants_json) {
+  const FabricEstimate figures = estimate(description);
+  if (wants_json) {
+    nlohmann::json json{{"fabric", description.name()},
+                        {"ends", figures.tile.ends},
+                        {"picks", figures.tile.picks},
+                        {"fibres", figures.tile.fibres},
+                        {"segments", figures.tile.segments},
+                        {"memory_bytes", figures.tile.memory_bytes},
+                        {"cells", nullptr},
+                        {"database_bytes", figures.database_bytes},
+                        {"core_seconds", figures.core_seconds}};
+    if (figures.cells) {
+      json["cells"] = *figures.cells;
+    }
+    fmt::print("{}\n", json.dump(2));
+    return;
+  }
+  fmt::print("fabric         {}\n", description.name());
+  if (figures.tile.ends > 0) {
+    fmt::print("tile           {} ends x {} picks\n", figures.tile.ends, figures.tile.picks);
+  }
+  fmt::print("fibres         {}\nsegments       {}\nmemory         {}\n", figures.tile.fibres,
+             figures.tile.segments, format_bytes(figures.tile.memory_bytes));
+  if (figures.cells) {
+    fmt::print("cells          about {}\n", *figures.cells);
+  } else {
+    fmt::print("cells          known when the fibres are; their time and disk are not counted\n");
+  }
+  fmt::print("database       about {}\n", format_bytes(figures.database_bytes));
+  fmt::print("time           about {} on one core (within a factor of three)\n",
+             format_duration(figures.core_seconds));
+}
+
+}  // namespace weft::cli

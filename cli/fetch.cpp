@@ -1,0 +1,82 @@
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "cli/add_command.h"
+#include "cli/client.h"
+#include "cli/commands.h"
+#include "cli/fabric_reference.h"
+#include "cli/fetch_version.h"
+#include "cli/output_file.h"
+#include "cli/present.h"
+#include "cli/progress.h"
+
+namespace weft::cli {
+
+namespace {
+
+constexpr const char* kHelp =
+    "Bring a published version to a file.\n"
+    "A fetch that was broken off goes on where it was (OUTPUT.DIGEST.part); the file is checked\n"
+    "against its digest before it gets its name.\n"
+    "Example: weft fetch silk@latest -o silk.h5";
+
+struct FetchOptions {
+  std::string coordinator;
+  std::string reference;
+  std::string output;
+  bool wants_json = false;
+};
+
+// Bytes so far, on a terminal only: a fetch takes seconds.
+FetchReport terminal_report() {
+  if (isatty(fileno(stderr)) != 1) {
+    return nullptr;
+  }
+  return [](std::uint64_t here, std::uint64_t total) {
+    fmt::print(stderr, "\r\x1b[K{} of {}{}", format_bytes(here), format_bytes(total),
+               here == total ? "\n" : "");
+  };
+}
+
+void run(const FetchOptions& options) {
+  Client client(options.coordinator);
+  const v1::Version version = find_version(client, options.reference);
+  const std::string output =
+      options.output.empty() ? reference_text(version) + ".h5" : options.output;
+  check_output_file(output);
+  const FetchOutcome outcome = fetch_version(client, version, output, terminal_report());
+  if (options.wants_json) {
+    print_json({{"output", output},
+                {"was_there", outcome == FetchOutcome::kWasThere},
+                {"version", to_json(version)}});
+    return;
+  }
+  fmt::print("{}: {}, {}, content {}{}\n", output, reference_text(version),
+             format_bytes(version.size_bytes()), short_digest(version.content_digest()),
+             outcome == FetchOutcome::kWasThere ? " (was there already)" : "");
+}
+
+}  // namespace
+
+void add_fetch(CLI::App& app) {
+  auto options = std::make_shared<FetchOptions>();
+  CLI::App* command = add_command(app, "fetch", kHelp);
+  command->add_option("reference", options->reference, "silk, silk@3 or silk@latest")
+      ->required()
+      ->check([](const std::string& text) {
+        return parse_reference(text)
+                   ? std::string()
+                   : "'" + text + "' is not a version; write NAME, NAME@NUMBER or NAME@latest";
+      });
+  command->add_option("-o,--output", options->output,
+                      "Database to write; default: NAME@NUMBER.h5 in this folder");
+  add_coordinator_option(*command, options->coordinator);
+  command->add_flag("--json", options->wants_json, "Print one JSON value on stdout");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace weft::cli

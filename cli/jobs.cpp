@@ -1,0 +1,75 @@
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "cli/add_command.h"
+#include "cli/client.h"
+#include "cli/commands.h"
+#include "cli/present.h"
+#include "cli/table.h"
+#include "proto/limits.h"
+
+namespace weft::cli {
+
+namespace {
+
+constexpr const char* kHelp =
+    "List the coordinator's jobs, newest first.\n"
+    "Times are UTC. SHARDS counts the units of work of the stages planned so far.\n"
+    "Example: weft jobs --unfinished";
+
+struct JobsOptions {
+  std::string coordinator;
+  std::uint32_t limit = 20;
+  bool is_unfinished_only = false;
+  bool wants_json = false;
+};
+
+// What people want to know next: the version made, what went wrong, what is lacking.
+std::string remark(const v1::Job& job) {
+  if (job.has_version()) {
+    return reference_text(job.version());
+  }
+  return job.error().empty() ? job.waiting_for() : job.error();
+}
+
+void run(const JobsOptions& options) {
+  Client client(options.coordinator);
+  v1::ListJobsRequest request;
+  request.set_unfinished_only(options.is_unfinished_only);
+  request.set_limit(options.limit);
+  const v1::ListJobsResponse response =
+      client.call(client.jobs(), &v1::JobService::Stub::ListJobs, request, "list the jobs");
+  if (options.wants_json) {
+    nlohmann::json json = nlohmann::json::array();
+    for (const v1::Job& job : response.jobs()) {
+      json.push_back(to_json(job));
+    }
+    print_json(json);
+    return;
+  }
+  Table table({"JOB", "FABRIC", "STATE", "SHARDS", "SUBMITTED", "REMARK"});
+  for (const v1::Job& job : response.jobs()) {
+    table.add({job.id(), job.fabric(), state_text(job.state()), shards_text(job),
+               time_text(job.submitted_at_ms()), remark(job)});
+  }
+  fmt::print("{}", table.text());
+}
+
+}  // namespace
+
+void add_jobs(CLI::App& app) {
+  auto options = std::make_shared<JobsOptions>();
+  CLI::App* command = add_command(app, "jobs", kHelp);
+  command->add_flag("--unfinished", options->is_unfinished_only,
+                    "Only jobs that are queued or under way");
+  command->add_option("--limit", options->limit, "How many jobs at most")
+      ->check(CLI::Range(1U, v1::kListLimit))
+      ->capture_default_str();
+  add_coordinator_option(*command, options->coordinator);
+  command->add_flag("--json", options->wants_json, "Print one JSON array on stdout");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace weft::cli

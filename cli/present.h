@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/progress.h"
+#include "proto/weft/v1/cluster.pb.h"
+
+// The coordinator's messages as people and programs read them.
+
+namespace weft::cli {
+
+// "queued", "running", "committing", "succeeded", "failed", "cancelled".
+[[nodiscard]] std::string state_text(v1::JobState state);
+
+// "2026-11-22 09:04:05" (UTC); "-" for 0.
+[[nodiscard]] std::string time_text(std::int64_t at_ms);
+
+// "silk@3".
+[[nodiscard]] std::string reference_text(const v1::Version& version);
+
+// The first 12 hexadecimal digits.
+[[nodiscard]] std::string short_digest(const std::string& binary_digest);
+
+// Shards done and in all of the stages that are known, "512/1024".
+[[nodiscard]] std::string shards_text(const v1::Job& job);
+
+[[nodiscard]] std::vector<StageProgress> stages_of(const v1::Job& job);
+
+// Names as in cluster.proto; digests in hexadecimal; times in ISO 8601 (UTC), null when not
+// reached.
+[[nodiscard]] nlohmann::json to_json(const v1::Job& job);
+[[nodiscard]] nlohmann::json to_json(const v1::Version& version);
+[[nodiscard]] nlohmann::json to_json(const v1::Fabric& fabric);
+[[nodiscard]] nlohmann::json to_json(const v1::Worker& worker);
+
+// One JSON value on stdout, indented, with a line break.
+void print_json(const nlohmann::json& json);
+
+}  // namespace weft::cli

@@ -1,0 +1,136 @@
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "cli/add_command.h"
+#include "cli/client.h"
+#include "cli/commands.h"
+#include "cli/estimate.h"
+#include "cli/fetch_version.h"
+#include "cli/follow_job.h"
+#include "cli/output_file.h"
+#include "cli/present.h"
+#include "cli/quality.h"
+#include "core/error.h"
+#include "fabric/description.h"
+#include "proto/limits.h"
+
+namespace weft::cli {
+
+namespace {
+
+constexpr const char* kHelp =
+    "Queue the precomputation of a fabric with a coordinator.\n"
+    "Every file that the description names is sent with it. Work that was done before, for any\n"
+    "fabric, is not done again.\n"
+    "With --wait, progress is shown until the job has ended; Ctrl-C ends the waiting, not the "
+    "job.\n"
+    "Example: weft submit examples/tiny.textproto --quality preview --wait -o tiny.h5";
+
+struct SubmitOptions {
+  std::string coordinator;
+  std::string fabric;
+  std::string output;
+  std::string quality;
+  std::string comment;
+  bool is_waiting = false;
+  bool is_dry_run = false;
+  bool wants_json = false;
+};
+
+v1::Job submit(Client& client, const v1::FabricDescription& description,
+               const std::string& comment) {
+  v1::SubmitRequest request;
+  request.set_request_id(new_request_id());
+  *request.mutable_description() = description;
+  request.mutable_options()->set_comment(comment);
+  if (request.ByteSizeLong() > v1::kMessageLimitBytes) {
+    throw core::Error(core::Code::kResourceExhausted,
+                      fmt::format("the description is larger than {} with the files it names; "
+                                  "crop the draft, or give fewer fibres",
+                                  format_bytes(v1::kMessageLimitBytes)));
+  }
+  return client
+      .call_repeatedly(client.jobs(), &v1::JobService::Stub::Submit, request,
+                       "submit " + description.name())
+      .job();
+}
+
+void run(const SubmitOptions& options) {
+  const v1::FabricDescription description =
+      fabric::load_description(options.fabric, parse_quality(options.quality));
+  if (options.is_dry_run) {
+    print_estimate(description, options.wants_json);
+    return;
+  }
+  if (!options.output.empty()) {
+    check_output_file(options.output);
+  }
+  Client client(options.coordinator);
+  v1::Job job = submit(client, description, options.comment);
+  fmt::print(stderr, "submitted {} as {}; 'weft watch {}' shows how far it is\n", job.fabric(),
+             job.id(), job.id());
+  if (options.is_waiting) {
+    job = follow_job(client, job.id());
+  }
+  bool was_fetched = false;
+  if (job.state() == v1::JOB_STATE_SUCCEEDED && !options.output.empty()) {
+    fetch_version(client, job.version(), options.output, nullptr);
+    was_fetched = true;
+  }
+  if (options.wants_json) {
+    nlohmann::json json = to_json(job);
+    json["output"] = nullptr;
+    if (was_fetched) {
+      json["output"] = options.output;
+    }
+    print_json(json);
+  }
+  if (options.is_waiting) {
+    throw_unless_succeeded(job);
+  }
+  if (options.wants_json) {
+    return;
+  }
+  if (was_fetched) {
+    fmt::print("{}: {}, {}, content {}\n", options.output, reference_text(job.version()),
+               format_bytes(job.version().size_bytes()),
+               short_digest(job.version().content_digest()));
+  } else if (options.is_waiting) {
+    fmt::print("{}\n", reference_text(job.version()));
+  } else {
+    fmt::print("{}\n", job.id());
+  }
+}
+
+}  // namespace
+
+void add_submit(CLI::App& app) {
+  auto options = std::make_shared<SubmitOptions>();
+  CLI::App* command = add_command(app, "submit", kHelp);
+  command->add_option("fabric", options->fabric, "Description: a .textproto or .json file")
+      ->required();
+  add_quality_option(*command, options->quality);
+  command->add_option("--comment", options->comment, "A line kept with the version (1024 bytes)")
+      ->check([](const std::string& text) {
+        return text.size() <= v1::kCommentLimitBytes ? std::string()
+                                                     : "the comment is longer than 1024 bytes";
+      });
+  CLI::Option* wait =
+      command->add_flag("--wait", options->is_waiting, "Return when the job has ended");
+  command
+      ->add_option("-o,--output", options->output,
+                   "Fetch the database into this file when it is done (needs --wait)")
+      ->needs(wait);
+  command
+      ->add_flag("--dry-run", options->is_dry_run,
+                 "Only print what the fabric will need: fibres, segments, memory, disk, time")
+      ->excludes(wait);
+  add_coordinator_option(*command, options->coordinator);
+  command->add_flag("--json", options->wants_json, "Print one JSON value on stdout");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace weft::cli
