@@ -1,0 +1,144 @@
+#include "shading/bcsdf_sh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "shading/lobe_normalisation.h"
+#include "shading/quadrature.h"
+
+namespace weft::shading {
+namespace {
+
+constexpr double kHalfPiExact = std::numbers::pi / 2;
+
+using ShDouble = std::array<double, kShMaxCount>;
+
+// The harmonics of spherical_harmonics.h in double precision: K_l^m Q_l^m(z) (x + i y)^m.
+ShDouble evaluate_sh(double x, double y, double z) {
+  ShDouble out{};
+  double c = 1;
+  double s = 0;
+  double diagonal = std::sqrt(1 / (4 * std::numbers::pi));  // K_m^m Q_m^m
+  for (int m = 0; m <= kShMaxOrder; ++m) {
+    if (m > 0) {
+      const double next = x * c - y * s;
+      s = x * s + y * c;
+      c = next;
+      diagonal *= std::sqrt((2 * m + 1) / (2.0 * m));
+    }
+    double before = 0;
+    double value = diagonal;
+    for (int l = m; l <= kShMaxOrder; ++l) {
+      if (l > m) {
+        // Normalised recurrence of the associated Legendre functions.
+        const double l2 = l * l;
+        const double m2 = m * m;
+        const double a = std::sqrt((4 * l2 - 1) / (l2 - m2));
+        const double b = std::sqrt(((l - 1.0) * (l - 1.0) - m2) / (4 * (l - 1.0) * (l - 1.0) - 1));
+        const double next = a * (z * value - b * before);
+        before = value;
+        value = next;
+      }
+      const auto j = static_cast<std::size_t>(l * (l + 1));
+      if (m == 0) {
+        out[j] = value;
+      } else {
+        out[j + static_cast<std::size_t>(m)] = std::numbers::sqrt2 * value * c;
+        out[j - static_cast<std::size_t>(m)] = std::numbers::sqrt2 * value * s;
+      }
+    }
+  }
+  return out;
+}
+
+// Integrals over the sphere of Y_j M_beta cos^2 and an azimuthal density, without and with the
+// Schlick weight: the material's colours come in linearly afterwards.
+struct LobeSh {
+  ShDouble plain{};
+  ShDouble schlick{};
+};
+
+// exp(-kappa (1 + cos phi)), normalised over the trapezoid rule's own points, which is exact for a
+// periodic function; kappa = 0 is the uniform density of reflection.
+std::vector<double> azimuth_weights(double kappa) {
+  const double gamma = kappa > 0 ? 1 / std::sqrt(kappa) : 1e9;
+  const int least = 2 * (kShMaxOrder + static_cast<int>(std::ceil(8 / gamma)));
+  std::vector<double> weights(static_cast<std::size_t>(std::max(32, least)));
+  double sum = 0;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    const double phi =
+        2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(weights.size());
+    weights[k] = std::exp(-kappa * (1 + std::cos(phi)));
+    sum += weights[k];
+  }
+  for (double& w : weights) {
+    w /= sum;
+  }
+  return weights;
+}
+
+LobeSh lobe_sh(double theta_o, double beta, double kappa) {
+  static const QuadratureRule rule = gauss_legendre(48);
+  const std::vector<double> azimuth = azimuth_weights(kappa);
+  const double low = std::max(-kHalfPiExact, -theta_o - 9 * beta);
+  const double high = std::min(kHalfPiExact, -theta_o + 9 * beta);
+  LobeSh sum;
+  for (std::size_t n = 0; n < rule.nodes.size(); ++n) {
+    const double theta = 0.5 * (low + high) + 0.5 * (high - low) * rule.nodes[n];
+    const double c = std::cos(theta);
+    const double d = (theta + theta_o) / beta;
+    const double m = std::exp(-0.5 * d * d) / (std::sqrt(2 * std::numbers::pi) * beta) /
+                     lobe_normalisation(theta, beta);
+    const double weight = rule.weights[n] * 0.5 * (high - low) * m * c * c;
+    const double schlick = weight * std::pow(1 - c, 5);
+    for (std::size_t k = 0; k < azimuth.size(); ++k) {
+      const double phi =
+          2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(azimuth.size());
+      const ShDouble y = evaluate_sh(std::sin(theta), c * std::cos(phi), c * std::sin(phi));
+      for (std::size_t j = 0; j < y.size(); ++j) {
+        sum.plain[j] += y[j] * weight * azimuth[k];
+        sum.schlick[j] += y[j] * schlick * azimuth[k];
+      }
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+BcsdfSh bcsdf_sh(const FibreMaterial& material, double theta_o) {
+  const double gamma = material.gamma_tt;
+  const LobeSh r = lobe_sh(theta_o, material.beta_r, 0);
+  const LobeSh tt = lobe_sh(theta_o, material.beta_tt, 1 / (gamma * gamma));
+  BcsdfSh out;
+  for (int channel = 0; channel < 3; ++channel) {
+    const double c_r = material.c_r[channel];
+    const double c_tt = material.c_tt[channel];
+    auto& c = out[static_cast<std::size_t>(channel)];
+    for (std::size_t j = 0; j < c.size(); ++j) {
+      // F = C_R + (1 - C_R) schlick, 1 - F = (1 - C_R)(1 - schlick).
+      c[j] = c_r * r.plain[j] + (1 - c_r) * r.schlick[j] +
+             c_tt * (1 - c_r) * (tt.plain[j] - tt.schlick[j]);
+    }
+  }
+  return out;
+}
+
+std::vector<float> bcsdf_sh_table(const FibreMaterial& material, int order) {
+  const auto count = static_cast<std::size_t>((order + 1) * (order + 1));
+  std::vector<float> table(3 * kBcsdfShAngles * count);
+  for (std::size_t i = 0; i < kBcsdfShAngles; ++i) {
+    const double theta_o =
+        -kHalfPiExact + std::numbers::pi * static_cast<double>(i) / (kBcsdfShAngles - 1);
+    const BcsdfSh c = bcsdf_sh(material, theta_o);
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      for (std::size_t j = 0; j < count; ++j) {
+        table[(channel * kBcsdfShAngles + i) * count + j] = static_cast<float>(c[channel][j]);
+      }
+    }
+  }
+  return table;
+}
+
+}  // namespace weft::shading
