@@ -24,6 +24,8 @@ int main(int argc, char** argv) {
   cli::add_fabrics(app);
   cli::add_versions(app);
   cli::add_fetch(app);
+  cli::add_inspect(app);
+  cli::add_verify(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

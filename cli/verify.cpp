@@ -1,0 +1,49 @@
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "core/digest.h"
+#include "core/error.h"
+#include "storage/fabric_database.h"
+
+namespace weft::cli {
+
+void add_verify(CLI::App& app) {
+  struct Options {
+    std::filesystem::path file;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();  // lives as long as the callback
+  CLI::App* const command = app.add_subcommand(
+      "verify", "Check that a fabric database is whole: recompute its digest and read all of it");
+  command->add_option("FILE", options->file, "fabric database (.h5)")->required();
+  command->add_flag("--json", options->json,
+                    "print one JSON value, of a damaged file too (with \"valid\": false)");
+  command->callback([options] {
+    nlohmann::ordered_json json{{"file", options->file.string()}};
+    try {
+      const core::Digest digest = storage::verify_database(options->file);
+      json["valid"] = true;
+      json["content_digest"] = digest.hex();
+    } catch (const core::Error& error) {
+      if (options->json && error.code() == core::Code::kDataLoss) {
+        json["valid"] = false;
+        json["error"] = error.what();
+        std::printf("%s\n", json.dump(2).c_str());
+      }
+      throw;
+    }
+    if (options->json) {
+      std::printf("%s\n", json.dump(2).c_str());
+    } else {
+      std::printf("%s is whole\ncontent digest %s\n", options->file.c_str(),
+                  json["content_digest"].get<std::string>().c_str());
+    }
+  });
+}
+
+}  // namespace weft::cli

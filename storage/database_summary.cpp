@@ -1,0 +1,59 @@
+#include "storage/database_summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/half.h"
+#include "storage/database_schema.h"
+#include "storage/h5.h"
+
+namespace weft::storage {
+
+namespace {
+
+double root_mean_square(const std::vector<float>& values) {
+  double sum = 0;
+  for (const float value : values) {
+    sum += static_cast<double>(value) * static_cast<double>(value);
+  }
+  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+}  // namespace
+
+std::vector<StoredDataset> stored_datasets(const std::filesystem::path& path) {
+  const h5::Reader reader(path);
+  std::vector<StoredDataset> datasets;
+  for (const DatasetSpec& spec : dataset_specs()) {
+    const h5::Reader::Info info = reader.info(spec.path);
+    datasets.push_back({spec.path, h5::to_string(info.element), info.shape, info.stored_bytes});
+  }
+  return datasets;
+}
+
+DatabaseErrors database_errors(const FabricDatabase& database) {
+  DatabaseErrors errors;
+  errors.transfer_rms = root_mean_square(database.transfer);
+  errors.standard_error_rms = root_mean_square(database.transfer_se);
+  if (!database.cell_paths.empty()) {
+    const auto [fewest, most] =
+        std::minmax_element(database.cell_paths.begin(), database.cell_paths.end());
+    errors.fewest_paths = *fewest;
+    errors.most_paths = *most;
+  }
+  double open = 0;
+  std::size_t blocked = 0;
+  for (const std::uint16_t half : database.open_share) {
+    const double share = core::float_from_half(half);
+    open += share;
+    blocked += share == 0 ? 1 : 0;
+  }
+  if (!database.open_share.empty()) {
+    const auto segments = static_cast<double>(database.open_share.size());
+    errors.mean_open_share = open / segments;
+    errors.blocked_share = static_cast<double>(blocked) / segments;
+  }
+  return errors;
+}
+
+}  // namespace weft::storage
