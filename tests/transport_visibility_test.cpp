@@ -1,0 +1,172 @@
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "core/random.h"
+#include "tests/transport_tiles.h"
+#include "transport/signed_distance.h"
+#include "transport/sphere.h"
+#include "transport/visibility.h"
+#include "transport/visibility_sg.h"
+
+namespace weft::transport {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+glm::dvec3 pixel_direction(std::uint32_t pixel, std::uint32_t resolution) {
+  const double theta = row_theta(pixel / resolution, resolution);
+  const double phi = column_phi(pixel % resolution, resolution);
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
+
+// Random blobs: what is visible is the union of caps.
+std::vector<std::uint8_t> random_image(std::uint32_t resolution, int caps, std::uint64_t seed) {
+  std::vector<std::uint8_t> bits(resolution * resolution / 8);
+  for (std::uint32_t p = 0; p < resolution * resolution; ++p) {
+    for (int i = 0; i < caps; ++i) {
+      core::Random random(seed, static_cast<std::uint32_t>(i));
+      const glm::dvec3 centre(test::random_direction(random));
+      const double radius = 0.05 + 0.4 * random.uniform_double();
+      if (glm::dot(centre, pixel_direction(p, resolution)) > std::cos(radius)) {
+        bits[p / 8] = static_cast<std::uint8_t>(bits[p / 8] | 1U << (p % 8));
+      }
+    }
+  }
+  return bits;
+}
+
+TEST(TransportSignedDistance, EqualsBruteForce) {
+  constexpr std::uint32_t kResolution = 32;
+  for (const int caps : {1, 3, 8}) {
+    const auto bits = random_image(kResolution, caps, 5);
+    const auto distances = signed_distance(bits, kResolution);
+    for (std::uint32_t p = 0; p < kResolution * kResolution; ++p) {
+      double nearest = 4;
+      for (std::uint32_t q = 0; q < kResolution * kResolution; ++q) {
+        if (is_visible(bits, p) != is_visible(bits, q)) {
+          const glm::dvec3 a = pixel_direction(p, kResolution);
+          const glm::dvec3 b = pixel_direction(q, kResolution);
+          nearest = std::fmin(nearest, std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
+        }
+      }
+      ASSERT_NEAR(distances[p], is_visible(bits, p) ? nearest : -nearest, 5e-6)
+          << caps << " caps, pixel " << p;
+    }
+  }
+}
+
+TEST(TransportSignedDistance, UniformImages_AreHalfATurnAway) {
+  const std::vector<std::uint8_t> open(32, 0xff);
+  const std::vector<std::uint8_t> blocked(32, 0x00);
+  for (const float d : signed_distance(open, 16)) {
+    EXPECT_EQ(d, kPi);
+  }
+  for (const float d : signed_distance(blocked, 16)) {
+    EXPECT_EQ(d, -kPi);
+  }
+}
+
+TEST(TransportSignedDistance, BiasCorrection_NeverTurnsASign) {
+  const auto bits = random_image(64, 5, 9);
+  auto distances = signed_distance(bits, 64);
+  const auto before = distances;
+  correct_pixel_bias(distances, 64);
+  const float bias = 0.6f * kPi / 64;
+  for (std::size_t p = 0; p < distances.size(); ++p) {
+    EXPECT_EQ(distances[p] > 0, is_visible(bits, p));
+    EXPECT_NEAR(std::abs(before[p]) - std::abs(distances[p]),
+                std::fmin(bias, std::abs(before[p]) / 2), 1e-6f);
+  }
+}
+
+TEST(TransportVisibility, HalfTheSky_IsHiddenByAPlaneOfTouchingFibres) {
+  // Fibres side by side above a lower one: it sees nothing above, and below all but its lateral
+  // copies' thin strips at the horizon.
+  fabric::Tile tile = test::crossed_layers(1, 20, 0.026f, 4);
+  test::add_strand(tile, {{0.5f, 0, -0.5f}, {0.5f, 0.5f, -0.5f}, {0.5f, 1, -0.5f}}, 0.01f, 0, 1);
+  test::finish(tile);
+  const Scene scene(tile);
+  const std::uint32_t low = tile.segment_count() - 1;
+  constexpr std::uint32_t kResolution = 32;
+  const auto bits = visibility_bits(scene, low, kResolution);
+  for (std::uint32_t p = 0; p < kResolution * kResolution; ++p) {
+    const glm::dvec3 direction = pixel_direction(p, kResolution);
+    if (direction.z > 0) {
+      EXPECT_FALSE(is_visible(bits, p)) << p;
+    }
+    if (direction.z < -0.1) {
+      EXPECT_TRUE(is_visible(bits, p)) << p;
+    }
+  }
+  EXPECT_NEAR(open_share(bits, kResolution), 0.5, 0.05);
+}
+
+TEST(TransportVisibility, Bits_AreWhatRaysSay) {
+  const fabric::Tile tile = test::random_hairs(300, 0.4f, 0.3f, 0.15f, 21);
+  const Scene scene(tile);
+  constexpr std::uint32_t kResolution = 64;
+  std::uint32_t different = 0;
+  std::uint32_t visible = 0;
+  for (std::uint32_t k = 0; k < tile.segment_count(); k += 97) {
+    const auto bits = visibility_bits(scene, k, kResolution);
+    for (std::uint32_t p = 0; p < kResolution * kResolution; ++p) {
+      const bool blocked =
+          scene.occluded(tile.wrapped_midpoint(k), glm::vec3(pixel_direction(p, kResolution)),
+                         std::numeric_limits<float>::infinity(), scene.own_copy(k));
+      different += is_visible(bits, p) == blocked ? 1 : 0;
+      visible += blocked ? 0 : 1;
+    }
+  }
+  EXPECT_GT(visible, 100u);
+  EXPECT_LE(different, 1u);  // a ray that grazes a fibre within rounding
+}
+
+TEST(TransportVisibilitySg, Weights_SumToTheVisibleHemisphere) {
+  constexpr std::uint32_t kResolution = 64;
+  const auto axes = sg_axes(48, sg_rotation(3, 17));
+  const std::vector<std::uint8_t> open(kResolution * kResolution / 8, 0xff);
+  const auto weights = sg_weights(open, kResolution, axes);
+  EXPECT_NEAR(std::accumulate(weights.begin(), weights.end(), 0.0), 2 * kPi, 1e-4);
+  // Voronoi areas of the half-cell points lie within .55 to 1.31 of their mean.
+  for (const float w : weights) {
+    EXPECT_GT(w, 0.5f * 2 * kPi / 48);
+    EXPECT_LT(w, 1.4f * 2 * kPi / 48);
+  }
+}
+
+TEST(TransportVisibilitySg, Weights_GoToTheNearestAxis) {
+  constexpr std::uint32_t kResolution = 32;
+  const auto axes = sg_axes(12, 5000);
+  for (std::uint32_t p = 0; p < kResolution * kResolution; p += 7) {
+    std::vector<std::uint8_t> bits(kResolution * kResolution / 8);
+    bits[p / 8] = static_cast<std::uint8_t>(1U << (p % 8));
+    const auto weights = sg_weights(bits, kResolution, axes);
+    const glm::vec3 direction(pixel_direction(p, kResolution));
+    std::size_t nearest = 0;
+    for (std::size_t q = 1; q < axes.size(); ++q) {
+      nearest = glm::dot(axes[q], direction) > glm::dot(axes[nearest], direction) ? q : nearest;
+    }
+    const double expected =
+        p / kResolution < kResolution / 2 ? pixel_solid_angle(p / kResolution, kResolution) : 0;
+    EXPECT_NEAR(weights[nearest], expected, 1e-7);
+    EXPECT_NEAR(std::accumulate(weights.begin(), weights.end(), 0.0), expected, 1e-7);
+  }
+}
+
+TEST(TransportVisibilitySg, Rotation_DependsOnSeedAndSegmentAlone) {
+  EXPECT_EQ(sg_rotation(1, 2), sg_rotation(1, 2));
+  EXPECT_NE(sg_rotation(1, 2), sg_rotation(1, 3));
+  EXPECT_NE(sg_rotation(1, 2), sg_rotation(2, 2));
+  const glm::vec3 still = sg_axes(48, 0)[7];
+  const glm::vec3 quarter = sg_axes(48, 16384)[7];
+  EXPECT_NEAR(quarter.x, -still.y, 1e-6f);
+  EXPECT_NEAR(quarter.y, still.x, 1e-6f);
+}
+
+}  // namespace
+}  // namespace weft::transport

@@ -1,0 +1,34 @@
+#include "transport/visibility.h"
+
+#include <cmath>
+#include <limits>
+
+#include "core/check.h"
+#include "transport/sphere.h"
+
+namespace weft::transport {
+
+std::vector<std::uint8_t> visibility_bits(const Scene& scene, std::uint32_t segment,
+                                          std::uint32_t resolution, const Checkpoint& checkpoint) {
+  CHECK_EQ(resolution % 8, 0U);
+  const glm::vec3 origin = scene.tile().wrapped_midpoint(segment);
+  const StrandCopy own = scene.own_copy(segment);
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  std::vector<std::uint8_t> bits(std::size_t{resolution} * resolution / 8);
+  std::size_t pixel = 0;
+  for (std::uint32_t row = 0; row < resolution; ++row) {
+    pass(checkpoint);
+    const double theta = row_theta(row, resolution);
+    for (std::uint32_t column = 0; column < resolution; ++column, ++pixel) {
+      const double phi = column_phi(column, resolution);
+      const glm::vec3 direction{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                                std::cos(theta)};
+      if (!scene.occluded(origin, direction, kFar, own)) {
+        bits[pixel / 8] = static_cast<std::uint8_t>(bits[pixel / 8] | 1U << (pixel % 8));
+      }
+    }
+  }
+  return bits;
+}
+
+}  // namespace weft::transport
