@@ -1,0 +1,72 @@
+#include "transport/path.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace weft::transport {
+
+namespace {
+constexpr float kFar = std::numeric_limits<float>::infinity();
+}
+
+Path::Path(const Scene& scene, std::span<const shading::FibreBcsdf> materials,
+           std::uint32_t segment, glm::vec3 direction)
+    : scene_(scene),
+      materials_(materials),
+      position_mm_(scene.tile().wrapped_midpoint(segment)),
+      direction_(direction),
+      own_(scene.own_copy(segment)) {}
+
+bool Path::advance() {
+  const auto hit = scene_.closest(position_mm_, direction_, kFar, own_);
+  if (!hit) {
+    return false;
+  }
+  const fabric::Tile& tile = scene_.tile();
+  const glm::ivec2 from = scene_.tile_of(position_mm_);
+  const glm::vec3 reached = position_mm_ + hit->t_mm * direction_;
+  const glm::ivec2 into = scene_.tile_of(reached);
+  position_mm_ = reached - glm::vec3(static_cast<float>(into.x) * tile.size_mm.x,
+                                     static_cast<float>(into.y) * tile.size_mm.y, 0);
+  // Rounding may leave the point just outside the tile it was moved to; names follow the point.
+  own_ = scene_.seen_from(hit->copy, into - from + scene_.tile_of(position_mm_));
+
+  const fabric::Segment segment = tile.segment(hit->segment);
+  frame_ = shading::fibre_frame(glm::normalize(segment.b_mm - segment.a_mm), -direction_);
+  omega_o_ = frame_ * -direction_;
+  bcsdf_ = &materials_[tile.strands[tile.segment_strand[hit->segment]].material];
+  ++vertices_;
+  return true;
+}
+
+bool Path::scatter(core::Random& random) {
+  const float u_lobe = random.uniform();
+  const float u_theta = random.uniform();
+  const shading::BcsdfSample sample = bcsdf_->sample(omega_o_, u_lobe, u_theta, random.uniform());
+  if (!(sample.pdf > 0)) {
+    return false;
+  }
+  direction_ = glm::normalize(glm::transpose(frame_) * sample.omega_i);
+  throughput_ *= sample.weight;
+  const float survival = std::min(1.0f, std::max({throughput_.x, throughput_.y, throughput_.z}));
+  if (survival < 1) {
+    if (random.uniform() >= survival) {
+      return false;
+    }
+    throughput_ /= survival;
+  }
+  return true;
+}
+
+glm::vec3 Path::reflected(glm::vec3 towards_light) const {
+  // Not occluded(): transport does not see the exit of a fibre that overlaps the one it is on.
+  if (scene_.closest(position_mm_, towards_light, kFar, own_)) {
+    return {0, 0, 0};
+  }
+  return bcsdf_->evaluate_cos(frame_ * towards_light, omega_o_);
+}
+
+}  // namespace weft::transport

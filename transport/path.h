@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "core/random.h"
+#include "shading/fibre_bcsdf.h"
+#include "transport/scene.h"
+
+namespace weft::transport {
+
+// A path through endless cloth, from where radiance arrives towards where it comes from. Every
+// fibre hit is one scattering event (no surface cosine, no width factor); the fibre just hit is
+// ignored by the ray that leaves it.
+class Path {
+ public:
+  // Starts on the axis at the segment's midpoint, its own strand ignored. `materials` by the tile's
+  // material index; both references must outlive the path.
+  Path(const Scene& scene, std::span<const shading::FibreBcsdf> materials, std::uint32_t segment,
+       glm::vec3 direction);
+
+  // Goes on to the next fibre; false when the path leaves the cloth.
+  bool advance();
+
+  // Samples the direction to go on in and multiplies the throughput by S cos / pdf; then survives
+  // with probability min(1, largest throughput), which keeps the expectation. False when the path
+  // ends here. REQUIRES: advance() returned true.
+  bool scatter(core::Random& random);
+
+  // S(towards_light, -direction) cos(theta) at the fibre just met, zero when another fibre hides
+  // the light. REQUIRES: advance() returned true.
+  [[nodiscard]] glm::vec3 reflected(glm::vec3 towards_light) const;
+
+  [[nodiscard]] glm::vec3 direction() const { return direction_; }
+  [[nodiscard]] glm::vec3 throughput() const { return throughput_; }
+  [[nodiscard]] std::uint32_t vertices() const { return vertices_; }
+
+ private:
+  const Scene& scene_;
+  std::span<const shading::FibreBcsdf> materials_;
+  glm::vec3 position_mm_;
+  glm::vec3 direction_;
+  StrandCopy own_;  // relative to the tile that holds position_mm_
+  glm::vec3 throughput_{1, 1, 1};
+  std::uint32_t vertices_ = 0;
+  glm::mat3 frame_{1};  // of the fibre just met
+  glm::vec3 omega_o_{0, 0, 0};
+  const shading::FibreBcsdf* bcsdf_ = nullptr;
+};
+
+}  // namespace weft::transport

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "shading/fibre_bcsdf.h"
+#include "transport/checkpoint.h"
+#include "transport/scene.h"
+
+namespace weft::transport {
+
+// How the transfer matrix of a cell is estimated. Both have the same expectation: the operator of
+// T( omega_0, omega_1, x), radiance arriving at x from omega_1 per unit of distant light from
+// omega_0 after at least one scattering (Khungurn et al. 2017, section 4.2).
+enum class Estimator {
+  // The path's own exit is its light: 4 pi tau Y_j0(exit) Y_j1(omega_1). No shadow rays; the light
+  // is drawn from the density that the cloth transports, 16 to 38 times less variance per second.
+  kExit,
+  // The paper's: one light per path, uniform over the upper hemisphere, connected to every vertex.
+  kLight,
+};
+
+struct TransferSettings {
+  std::uint32_t sh_order = 5;
+  Estimator estimator = Estimator::kExit;
+  std::uint64_t seed = 0;
+  std::uint32_t max_path_length = 10000;  // scatterings; longer paths count for nothing
+  bool lights_below = false;  // else light comes from the upper hemisphere only, as in the paper
+};
+
+// Which paths of which cell.
+struct CellPaths {
+  std::uint32_t cell = 0;
+  std::span<const std::uint32_t> segments;  // whose midpoints lie in the cell; not empty
+  std::uint64_t first = 0;
+  std::uint64_t count = 0;
+};
+
+// Sums over paths of the estimates of a[j1, j0] and of their squares, in fixed point
+// (core/moments.h), [3, (order+1)^2 (j1, incoming), (order+1)^2 (j0, light)]. Chunks of 256 paths,
+// aligned to the path's number, are summed in float in order and then added in fixed point: the
+// sums of [0, n) are those of [0, m) plus [m, n) to the bit for every multiple m of 256. A chunk's
+// sum of squares saturates at 2^25, which takes a path whose estimate exceeds 5000.
+struct TransferSums {
+  std::uint64_t paths = 0;
+  std::vector<std::int64_t> sum;
+  std::vector<std::int64_t> sum_of_squares;
+};
+
+[[nodiscard]] TransferSums transfer_sums(const Scene& scene,
+                                         std::span<const shading::FibreBcsdf> materials,
+                                         const CellPaths& paths, const TransferSettings& settings,
+                                         const Checkpoint& checkpoint = {});
+
+}  // namespace weft::transport
