@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <array>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "core/error.h"
+#include "proto/arrays.h"
+#include "shading/fibre_bcsdf.h"
+#include "transport/transfer.h"
+#include "worker/bakers.h"
+
+namespace weft::worker {
+
+namespace {
+
+shading::FibreMaterial fibre_material(const v1::Material& material) {
+  const auto colour = [](const v1::Rgb& rgb) {
+    require(rgb.r() >= 0 && rgb.r() <= 1 && rgb.g() >= 0 && rgb.g() <= 1 && rgb.b() >= 0 &&
+                rgb.b() <= 1,
+            "transfer", "a material's colours must be between 0 and 1");
+    return glm::vec3(rgb.r(), rgb.g(), rgb.b());
+  };
+  const auto width = [](double degrees) {
+    require(degrees >= 0.1 && degrees <= 180, "transfer",
+            "a material's widths must be between 0.1 and 180 degrees");
+    return static_cast<float>(degrees * std::numbers::pi / 180);
+  };
+  return {colour(material.c_r()), colour(material.c_tt()), width(material.beta_r_deg()),
+          width(material.beta_tt_deg()), width(material.gamma_tt_deg())};
+}
+
+class TransferBaker : public Baker {
+ public:
+  explicit TransferBaker(const BakerContext& context)
+      : spec_(context.spec.transfer()), shard_count_(context.shard_count) {
+    require_inputs(context, "transfer", 2);
+    require(spec_.sh_order() <= 5, "transfer", "sh_order must be between 0 and 5");
+    require(spec_.paths_per_cell() > 0 && spec_.paths_per_shard() > 0, "transfer",
+            "paths_per_cell and paths_per_shard must be positive");
+    require(spec_.max_path_length() > 0, "transfer", "max_path_length must be positive");
+    require(spec_.estimator() == v1::TRANSFER_ESTIMATOR_EXIT ||
+                spec_.estimator() == v1::TRANSFER_ESTIMATOR_LIGHT,
+            "transfer", "the estimator must be EXIT or LIGHT");
+    input_ = std::make_unique<TileScene>(context.inputs[0]);
+    require(static_cast<std::size_t>(spec_.materials_size()) == input_->tile.material_names.size(),
+            "transfer", "there must be one material for each of the tile's");
+    for (const v1::Material& material : spec_.materials()) {
+      materials_.emplace_back(fibre_material(material));
+    }
+    read_cells(context.inputs[1]);
+    blocks_per_cell_ = (std::uint64_t{spec_.paths_per_cell()} + spec_.paths_per_shard() - 1) /
+                       spec_.paths_per_shard();
+    require(shard_count_ == segments_of_cell_.size() * blocks_per_cell_, "transfer",
+            "the number of shards is not cells times blocks per cell");
+  }
+
+  std::string bake(std::uint64_t shard, const std::string& /*shard_input*/,
+                   const std::function<bool()>& should_stop) const override {
+    require_shard(shard, shard_count_);
+    const std::uint64_t cell = shard / blocks_per_cell_;
+    transport::CellPaths paths;
+    paths.cell = static_cast<std::uint32_t>(cell);
+    paths.segments = segments_of_cell_[cell];
+    paths.first = shard % blocks_per_cell_ * spec_.paths_per_shard();
+    paths.count =
+        std::min<std::uint64_t>(spec_.paths_per_shard(), spec_.paths_per_cell() - paths.first);
+    transport::TransferSettings settings;
+    settings.sh_order = spec_.sh_order();
+    settings.estimator = spec_.estimator() == v1::TRANSFER_ESTIMATOR_LIGHT
+                             ? transport::Estimator::kLight
+                             : transport::Estimator::kExit;
+    settings.seed = spec_.seed();
+    settings.max_path_length = spec_.max_path_length();
+    const transport::TransferSums sums = transport::transfer_sums(
+        input_->scene, materials_, paths, settings, stop_point(should_stop));
+
+    const std::uint64_t j = std::uint64_t{spec_.sh_order() + 1} * (spec_.sh_order() + 1);
+    const std::array<std::uint64_t, 1> count{sums.paths};
+    v1::Arrays arrays;
+    v1::add_array<std::uint64_t>(arrays, "paths", {1}, count);
+    v1::add_array<std::int64_t>(arrays, "sum", {3, j, j}, sums.sum);
+    v1::add_array<std::int64_t>(arrays, "sum_of_squares", {3, j, j}, sums.sum_of_squares);
+    return v1::serialize(arrays);
+  }
+
+ private:
+  void read_cells(const std::string& grid) {
+    const v1::Arrays arrays = v1::parse_arrays(grid);
+    const auto cell_of_segment = v1::array_of<std::uint32_t>(arrays, "cell_of_segment");
+    std::vector<std::uint64_t> shape;
+    static_cast<void>(v1::array_of<std::uint32_t>(arrays, "cell_coordinates", &shape));
+    if (shape.empty() || cell_of_segment.size() != input_->tile.segment_count()) {
+      throw core::Error(core::Code::kDataLoss, "the grid was not made for this tile");
+    }
+    segments_of_cell_.resize(shape[0]);
+    for (std::uint32_t k = 0; k < cell_of_segment.size(); ++k) {
+      if (cell_of_segment[k] >= segments_of_cell_.size()) {
+        throw core::Error(core::Code::kDataLoss, "the grid names a cell that it does not have");
+      }
+      segments_of_cell_[cell_of_segment[k]].push_back(k);
+    }
+    for (const auto& segments : segments_of_cell_) {
+      if (segments.empty()) {
+        throw core::Error(core::Code::kDataLoss, "the grid has a cell without segments");
+      }
+    }
+  }
+
+  v1::TransferSpec spec_;
+  std::uint64_t shard_count_;
+  std::uint64_t blocks_per_cell_ = 1;
+  std::unique_ptr<TileScene> input_;
+  std::vector<shading::FibreBcsdf> materials_;
+  std::vector<std::vector<std::uint32_t>> segments_of_cell_;
+};
+
+}  // namespace
+
+std::unique_ptr<Baker> make_transfer_baker(const BakerContext& context) {
+  return std::make_unique<TransferBaker>(context);
+}
+
+}  // namespace weft::worker
