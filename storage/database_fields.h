@@ -47,8 +47,12 @@ void exchange_fields(Io& io, Database& db) {
   io.array("/visibility/ssdf/coefficients", db.ssdf);
   io.values("/visibility/ssdf/sign_error", &db.ssdf_sign_error);
   io.values("/visibility/ssg/sharpness", &db.sg_sharpness);
+  io.derived("/visibility/ssg/axes");
   io.array("/visibility/ssg/weights", db.ssg);
   io.array("/visibility/ssg/rotation", db.ssg_rotation);
+
+  io.derived("/sg/sharpness");
+  io.derived("/sg/zonal");
 
   io.text("/provenance/description", db.description_json);
   io.text("/provenance/stages", db.stages_json);

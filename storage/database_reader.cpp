@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <cmath>
 #include <tuple>
 
 #include "core/error.h"
 #include "core/half.h"
 #include "storage/database_fields.h"
 #include "storage/h5.h"
+#include "storage/light_tables.h"
 #include "storage/user_block.h"
 
 namespace weft::storage {
@@ -111,14 +111,13 @@ FabricDatabase read_contents(const std::filesystem::path& path) {
   FabricDatabase database;
   FieldReader reader(path);
   exchange_fields(reader, database);
-  const std::uint64_t coefficients = reader.extents().at("coefficients");
-  const auto order = static_cast<std::uint64_t>(std::sqrt(static_cast<double>(coefficients))) - 1;
-  if ((order + 1) * (order + 1) != coefficients) {
+  const std::uint64_t bands = reader.extents().at("bands");
+  if (bands > kMaxShOrder + 1 || bands * bands != reader.extents().at("coefficients")) {
     throw core::Error(core::Code::kDataLoss,
-                      "dataset /iirtf/transfer is wrong: its number of coefficients is not a "
-                      "square; fetch or make the file again");
+                      "dataset /iirtf/transfer is wrong: its number of coefficients does not fit "
+                      "the bands of /sg/zonal; fetch or make the file again");
   }
-  database.sh_order = static_cast<std::uint32_t>(order);
+  database.sh_order = static_cast<std::uint32_t>(bands - 1);
   database.visibility_resolution = static_cast<std::uint32_t>(reader.extents().at("resolution"));
   database.pca_components = static_cast<std::uint32_t>(reader.extents().at("components"));
   database.sg_count = static_cast<std::uint32_t>(reader.extents().at("sg_count"));

@@ -13,6 +13,7 @@
 #include "core/half.h"
 #include "storage/database_fields.h"
 #include "storage/h5.h"
+#include "storage/light_tables.h"
 #include "storage/user_block.h"
 
 namespace weft::storage {
@@ -58,6 +59,7 @@ Extents extents_of(const FabricDatabase& db) {
   extents.set("segments", db.cell_of_segment.size());
   extents.set("cells", db.cell_paths.size());
   extents.set("coefficients", std::uint64_t{db.sh_order + 1} * (db.sh_order + 1));
+  extents.set("bands", db.sh_order + 1);
   extents.set("resolution", db.visibility_resolution);
   extents.set("components", db.pca_components);
   extents.set("sg_count", db.sg_count);
@@ -69,6 +71,12 @@ class FieldWriter {
  public:
   explicit FieldWriter(const FabricDatabase& db)
       : db_(db), extents_(extents_of(db)), image_(kUserBlockBytes) {
+    if (db.sh_order > kMaxShOrder) {
+      throw core::Error(core::Code::kDataLoss,
+                        "dataset /iirtf/transfer cannot be written: its order is " +
+                            std::to_string(db.sh_order) + " and the highest is " +
+                            std::to_string(kMaxShOrder));
+    }
     image_.add_attribute("/", "format", "weft fabric database, docs/database_format.md");
     image_.add_attribute("/", "schema", static_cast<double>(kDatabaseSchema));
     image_.add_attribute(
@@ -122,12 +130,7 @@ class FieldWriter {
 
   void derived(const char* path) {
     const DatasetSpec& spec = dataset_spec(path);
-    const std::size_t count = count_of(spec);
-    std::vector<float> data(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      data[i] = static_cast<float>(scale_value(spec.path, i, count));
-    }
-    add(spec, spec.element, std::span<const float>(data));
+    add(spec, spec.element, std::span<const float>(derived_values(path)));
   }
 
   void texts(const char* path, const std::vector<std::string>& data) {
@@ -142,6 +145,7 @@ class FieldWriter {
 
   std::string finish() {
     image_.attach_scale("/materials/c_s", 2, "/materials/theta_o");
+    image_.attach_scale("/sg/zonal", 0, "/sg/sharpness");
     image_.attach_scale("/visibility/ssdf/mean", 0, "/visibility/theta");
     image_.attach_scale("/visibility/ssdf/mean", 1, "/visibility/phi");
     image_.attach_scale("/visibility/ssdf/basis", 1, "/visibility/theta");
@@ -174,15 +178,30 @@ class FieldWriter {
                      spec.compress, spec.caption);
   }
 
-  // Values of the dimension scales: 512 angles from -pi/2 to pi/2, and the centres of the pixels.
-  static double scale_value(std::string_view path, std::size_t i, std::size_t count) {
-    const auto index = static_cast<double>(i);
-    const auto n = static_cast<double>(count);
-    if (path == "/materials/theta_o") {
-      return -std::numbers::pi / 2 + index * std::numbers::pi / (n - 1);
+  // Datasets that follow from the others, for people who read the file.
+  [[nodiscard]] std::vector<float> derived_values(std::string_view path) const {
+    if (path == "/sg/sharpness") {
+      return zonal_sharpnesses();
     }
+    if (path == "/sg/zonal") {
+      return zonal_table(db_.sh_order);
+    }
+    if (path == "/visibility/ssg/axes") {
+      return unrotated_sg_axes(db_.sg_count);
+    }
+    // 512 angles from -pi/2 to pi/2 with both ends; centres of rows and columns of directions.
+    const bool is_theta_o = path == "/materials/theta_o";
+    const std::size_t count = is_theta_o ? 512 : db_.visibility_resolution;
     const double extent = path == "/visibility/phi" ? 2 * std::numbers::pi : std::numbers::pi;
-    return (index + 0.5) * extent / n;
+    std::vector<float> values(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto index = static_cast<double>(i);
+      const auto n = static_cast<double>(count);
+      values[i] =
+          static_cast<float>(is_theta_o ? index * std::numbers::pi / (n - 1) - std::numbers::pi / 2
+                                        : (index + 0.5) * extent / n);
+    }
+    return values;
   }
 
   const FabricDatabase& db_;
