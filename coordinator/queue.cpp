@@ -1,0 +1,281 @@
+#include "coordinator/queue.h"
+
+#include <algorithm>
+
+#include "core/check.h"
+
+namespace weft::coordinator {
+
+Queue::Queue(QueueSettings settings, std::uint32_t epoch)
+    : settings_(settings), next_attempt_((static_cast<std::uint64_t>(epoch) << 32) + 1) {
+  CHECK_GT(epoch, 0U);
+}
+
+Actions Queue::apply(const Event& event, Time now) {
+  Actions actions;
+  std::visit([&](const auto& e) { on(e, now, actions); }, event);
+  return actions;
+}
+
+const JobState* Queue::job(const std::string& id) const {
+  const auto order = order_of_job_.find(id);
+  return order == order_of_job_.end() ? nullptr : &jobs_.at(order->second);
+}
+
+JobState* Queue::find_job(const std::string& id) {
+  const auto order = order_of_job_.find(id);
+  return order == order_of_job_.end() ? nullptr : &jobs_.at(order->second);
+}
+
+std::vector<const JobState*> Queue::jobs() const {
+  std::vector<const JobState*> jobs;
+  for (const auto& [order, job] : jobs_) {
+    jobs.push_back(&job);
+  }
+  return jobs;
+}
+
+void Queue::forget_job(const std::string& id) {
+  const auto order = order_of_job_.find(id);
+  CHECK(order != order_of_job_.end());
+  CHECK(jobs_.at(order->second).has_ended());
+  jobs_.erase(order->second);
+  order_of_job_.erase(order);
+}
+
+bool Queue::is_live(const WorkerState& worker, Time now) const {
+  return now - worker.seen_at <= std::chrono::milliseconds(settings_.lease_ms);
+}
+
+std::vector<StageResults> Queue::finished_stages(const JobState& job) const {
+  std::vector<StageResults> finished;
+  for (const StageState& stage : job.stages) {
+    if (stage.is_done()) {
+      finished.push_back({stage.name, stage.results});
+    }
+  }
+  return finished;
+}
+
+void Queue::on(const SubmitEvent& event, Time now, Actions& actions) {
+  if (find_job(event.job) != nullptr) {
+    return;  // the same submission again
+  }
+  const std::uint64_t order = next_order_++;
+  order_of_job_[event.job] = order;
+  JobState& job = jobs_[order];
+  job.id = event.job;
+  job.fabric = event.fabric;
+  job.submitted_at = now;
+  job.served_at = now;
+  if (event.fingerprint) {
+    job.fingerprint = event.fingerprint;
+    ask_for_plan(job, actions);
+  }
+  bind_jobs(now, actions);
+}
+
+void Queue::on(const CancelEvent& event, Time now, Actions& actions) {
+  JobState* const job = find_job(event.job);
+  if (job != nullptr && !job->has_ended()) {
+    end_job(*job, JobPhase::kCancelled, now, actions);
+  }
+}
+
+void Queue::on(const JobFailedEvent& event, Time now, Actions& actions) {
+  JobState* const job = find_job(event.job);
+  if (job != nullptr && !job->has_ended() && job->generation == event.generation) {
+    job->error = event.error;
+    end_job(*job, JobPhase::kFailed, now, actions);
+  }
+}
+
+void Queue::on(const CommittedEvent& event, Time now, Actions& actions) {
+  JobState* const job = find_job(event.job);
+  if (job != nullptr && job->phase == JobPhase::kCommitting &&
+      job->generation == event.generation) {
+    end_job(*job, JobPhase::kSucceeded, now, actions);
+  }
+}
+
+void Queue::on(const PlannedEvent& event, Time now, Actions& actions) {
+  JobState* const job = find_job(event.job);
+  if (job == nullptr || job->has_ended() || job->generation != event.generation) {
+    return;
+  }
+  job->planning = false;
+  ++job->revision;
+  bool any_done = job->plan_again;
+  for (const PlannedStage& planned : event.stages) {
+    const bool is_known =
+        std::any_of(job->stages.begin(), job->stages.end(),
+                    [&](const StageState& stage) { return stage.name == planned.name; });
+    if (!is_known) {
+      add_stage(order_of_job_.at(job->id), *job, planned, now);
+      any_done = any_done || job->stages.back().is_done();
+      actions.wake = true;
+    }
+  }
+  if (any_done) {
+    ask_for_plan(*job, actions);
+  } else if (event.stages.empty() &&
+             std::all_of(job->stages.begin(), job->stages.end(),
+                         [](const StageState& stage) { return stage.is_done(); })) {
+    job->phase = JobPhase::kCommitting;
+    actions.commit.push_back({job->id, job->generation});
+  }
+}
+
+void Queue::on(const ResultLostEvent& event, Time now, Actions& actions) {
+  for (auto& [order, job] : jobs_) {
+    if (job.has_ended()) {
+      continue;
+    }
+    bool uses_it = false;
+    for (const StageState& stage : job.stages) {
+      for (std::size_t i = 0; i < stage.shards.size() && !uses_it; ++i) {
+        uses_it = stage.shards[i] == ShardState::kDone && stage.results[i] == event.result;
+      }
+    }
+    if (uses_it && job.generation >= settings_.reset_limit) {
+      job.error =
+          "results of this job were lost from the coordinator's disk again and again "
+          "(last: " +
+          event.result.hex() + "); check that disk, then submit the job again";
+      end_job(job, JobPhase::kFailed, now, actions);
+    } else if (uses_it) {
+      begin_again(job, actions);
+    }
+  }
+}
+
+void Queue::on(const TickEvent& /*event*/, Time now, Actions& actions) {
+  expire(now, actions);
+  bind_jobs(now, actions);
+  std::erase_if(workers_, [&](const auto& entry) {
+    return now - entry.second.seen_at > std::chrono::milliseconds(settings_.forget_worker_ms);
+  });
+}
+
+void Queue::ask_for_plan(JobState& job, Actions& actions) {
+  CHECK(job.fingerprint.has_value());
+  if (job.planning) {
+    job.plan_again = true;
+    return;
+  }
+  job.planning = true;
+  job.plan_again = false;
+  actions.plan.push_back({job.id, job.generation, *job.fingerprint});
+}
+
+void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& planned, Time now) {
+  StageState& stage = job.stages.emplace_back();
+  const std::size_t index = job.stages.size() - 1;
+  const std::size_t count = planned.digests.size();
+  stage.name = planned.name;
+  stage.digests = planned.digests;
+  stage.shards.assign(count, ShardState::kPending);
+  stage.results.assign(count, core::Digest{});
+  stage.started_at = now;
+  for (const KnownResult& known : planned.known) {
+    CHECK_LT(known.shard, count);
+    if (stage.shards[known.shard] == ShardState::kPending) {
+      stage.shards[known.shard] = ShardState::kDone;
+      stage.results[known.shard] = known.result;
+      ++stage.done;
+      ++stage.cached;
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (stage.shards[i] == ShardState::kPending) {
+      unfinished_[stage.digests[i]].push_back({order, index, i});
+    }
+  }
+  for (const PriorFailure& prior : planned.failures) {
+    if (prior.shard < count) {
+      ShardTrouble& trouble = stage.troubles[prior.shard];
+      ++trouble.failures;
+      trouble.workers.insert(prior.worker);
+      trouble.messages[prior.message].insert(prior.worker);
+    }
+  }
+  if (stage.is_done()) {
+    stage.ended_at = now;
+  }
+}
+
+void Queue::end_job(JobState& job, JobPhase phase, Time now, Actions& actions) {
+  drop_work(job);
+  job.phase = phase;
+  job.ended_at = now;
+  ++job.revision;
+  actions.ended.push_back(job.id);
+  actions.wake = true;
+}
+
+// Takes all of the job's shards out of the queue; its attempts no longer own anything, and their
+// workers are told so when they report next.
+void Queue::drop_work(JobState& job) {
+  const std::uint64_t order = order_of_job_.at(job.id);
+  std::erase_if(attempts_, [&](const auto& entry) { return entry.second.job == job.id; });
+  for (std::size_t s = 0; s < job.stages.size(); ++s) {
+    StageState& stage = job.stages[s];
+    for (std::size_t i = 0; i < stage.shards.size(); ++i) {
+      if (stage.shards[i] != ShardState::kDone) {
+        forget_ref(stage.digests[i], {order, s, i});
+        stage.shards[i] = ShardState::kPending;
+      }
+    }
+    stage.running = 0;
+  }
+}
+
+void Queue::begin_again(JobState& job, Actions& actions) {
+  drop_work(job);
+  job.stages.clear();
+  ++job.generation;
+  ++job.revision;
+  job.phase = job.phase == JobPhase::kQueued ? JobPhase::kQueued : JobPhase::kRunning;
+  job.planning = false;
+  job.plan_again = false;
+  actions.wake = true;
+  ask_for_plan(job, actions);
+}
+
+// A job uses results of one numerics fingerprint only: that of the workers which have the most
+// threads when it begins. When those are gone for long and others are there, it begins again.
+void Queue::bind_jobs(Time now, Actions& actions) {
+  std::map<core::Digest, std::uint64_t> threads;
+  for (const auto& [id, worker] : workers_) {
+    if (is_live(worker, now)) {
+      threads[worker.fingerprint] += worker.threads;
+    }
+  }
+  if (threads.empty()) {
+    return;
+  }
+  const core::Digest most =
+      std::max_element(threads.begin(), threads.end(), [](const auto& a, const auto& b) {
+        return a.second < b.second;
+      })->first;
+  for (auto& [order, job] : jobs_) {
+    if (job.has_ended() || job.phase == JobPhase::kCommitting) {
+      continue;
+    }
+    if (!job.fingerprint) {
+      job.fingerprint = most;
+      actions.bound.push_back({job.id, most});
+      ask_for_plan(job, actions);
+    }
+    if (threads.contains(*job.fingerprint)) {
+      job.served_at = now;
+    } else if (now - job.served_at > std::chrono::milliseconds(settings_.rebind_ms)) {
+      job.fingerprint = most;
+      job.served_at = now;
+      actions.bound.push_back({job.id, most});
+      begin_again(job, actions);
+    }
+  }
+}
+
+}  // namespace weft::coordinator
