@@ -402,6 +402,7 @@ std::vector<JobRecord> Journal::jobs(std::size_t ended_limit) {
 }
 
 std::optional<JobRecord> Journal::job_of_request(const std::string& request_id) {
+  wait(append({}));
   const std::lock_guard lock(state_->connection_mutex);
   Statement s(state_->connection,
               ("SELECT " + std::string(kJobColumns) + " FROM jobs WHERE request_id = ?").c_str());

@@ -66,7 +66,7 @@ void Queue::on(const SubmitEvent& event, Time now, Actions& actions) {
   JobState& job = jobs_[order];
   job.id = event.job;
   job.fabric = event.fabric;
-  job.submitted_at = now;
+  job.submitted_at = event.submitted_at;
   job.served_at = now;
   if (event.fingerprint) {
     job.fingerprint = event.fingerprint;

@@ -43,6 +43,7 @@ struct SubmitEvent {
   std::string job;
   std::string fabric;
   std::optional<core::Digest> fingerprint;  // of a job that was bound before a restart
+  Time submitted_at{};
 };
 
 struct CancelEvent {

@@ -1,0 +1,101 @@
+#include "coordinator/job_service.h"
+
+#include <thread>
+
+#include "coordinator/rpc.h"
+#include "proto/limits.h"
+
+namespace weft::coordinator {
+
+namespace {
+
+constexpr auto kWatchInterval = std::chrono::milliseconds(250);
+
+// Counts itself in a number while it lives.
+class Counted {
+ public:
+  explicit Counted(std::atomic<int>& count) : count_(count), value_(++count) {}
+  ~Counted() { --count_; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+  Counted(Counted&&) = delete;
+  Counted& operator=(Counted&&) = delete;
+  [[nodiscard]] int value() const { return value_; }
+
+ private:
+  std::atomic<int>& count_;
+  int value_;
+};
+
+}  // namespace
+
+grpc::Status JobService::Submit(grpc::ServerContext* /*context*/, const v1::SubmitRequest* request,
+                                v1::SubmitResponse* response) {
+  return answer("Submit", [&] {
+    *response->mutable_job() = scheduler_.submit(*request);
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::GetJob(grpc::ServerContext* /*context*/, const v1::GetJobRequest* request,
+                                v1::GetJobResponse* response) {
+  return answer("GetJob", [&] {
+    *response->mutable_job() = scheduler_.job(request->job_id());
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::ListJobs(grpc::ServerContext* /*context*/,
+                                  const v1::ListJobsRequest* request,
+                                  v1::ListJobsResponse* response) {
+  return answer("ListJobs", [&] {
+    const bool has_limit = request->limit() > 0 && request->limit() < v1::kListLimit;
+    for (v1::Job& job : scheduler_.jobs(request->unfinished_only(),
+                                        has_limit ? request->limit() : v1::kListLimit)) {
+      response->add_jobs()->Swap(&job);
+    }
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
+                                  grpc::ServerWriter<v1::WatchJobResponse>* writer) {
+  return answer("WatchJob", [&]() -> grpc::Status {
+    const Counted counted(watchers_);
+    if (counted.value() > kWatchersLimit) {
+      return {grpc::StatusCode::RESOURCE_EXHAUSTED,
+              "64 calls watch jobs already; ask with GetJob now and then"};
+    }
+    v1::Job job = scheduler_.job(request->job_id());
+    for (;;) {
+      v1::WatchJobResponse response;
+      *response.mutable_job() = job;
+      if (!writer->Write(response)) {
+        return {grpc::StatusCode::CANCELLED, "the caller went away"};
+      }
+      if (job.ended_at_ms() != 0) {
+        return grpc::Status::OK;
+      }
+      std::this_thread::sleep_for(kWatchInterval);
+      const std::uint64_t seen = job.revision();
+      do {
+        if (context->IsCancelled()) {
+          return {grpc::StatusCode::CANCELLED, "the caller went away"};
+        }
+        job = scheduler_.wait_for_change(job.id(), seen, std::chrono::seconds(1));
+      } while (job.revision() == seen);
+    }
+  });
+}
+
+grpc::Status JobService::CancelJob(grpc::ServerContext* /*context*/,
+                                   const v1::CancelJobRequest* request,
+                                   v1::CancelJobResponse* response) {
+  return answer("CancelJob", [&] {
+    check_id(request->request_id(), "request_id");
+    *response->mutable_job() = scheduler_.cancel(request->job_id());
+    return grpc::Status::OK;
+  });
+}
+
+}  // namespace weft::coordinator

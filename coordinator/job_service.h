@@ -1,0 +1,32 @@
+#pragma once
+
+#include <atomic>
+
+#include "coordinator/scheduler.h"
+#include "proto/weft/v1/cluster.grpc.pb.h"
+
+namespace weft::coordinator {
+
+inline constexpr int kWatchersLimit = 64;  // WatchJob calls at once; each holds a thread
+
+// What people do with jobs. Contracts: cluster.proto.
+class JobService final : public v1::JobService::Service {
+ public:
+  explicit JobService(Scheduler& scheduler) : scheduler_(scheduler) {}
+  grpc::Status Submit(grpc::ServerContext* context, const v1::SubmitRequest* request,
+                      v1::SubmitResponse* response) override;
+  grpc::Status GetJob(grpc::ServerContext* context, const v1::GetJobRequest* request,
+                      v1::GetJobResponse* response) override;
+  grpc::Status ListJobs(grpc::ServerContext* context, const v1::ListJobsRequest* request,
+                        v1::ListJobsResponse* response) override;
+  grpc::Status WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
+                        grpc::ServerWriter<v1::WatchJobResponse>* writer) override;
+  grpc::Status CancelJob(grpc::ServerContext* context, const v1::CancelJobRequest* request,
+                         v1::CancelJobResponse* response) override;
+
+ private:
+  Scheduler& scheduler_;
+  std::atomic<int> watchers_{0};
+};
+
+}  // namespace weft::coordinator

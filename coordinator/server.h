@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "coordinator/scheduler.h"
+
+namespace weft::coordinator {
+
+// The coordinator's services on one address.
+class Server {
+ public:
+  // `listen` is HOST:PORT (port 0: any free one) or unix:PATH. Without `insecure` only a Unix
+  // socket or a loopback address is taken, because nothing on the wire is encrypted and nobody is
+  // asked who they are. Throws core::Error(kPermissionDenied) then, and kUnavailable when the
+  // address cannot be had. `scheduler` must outlive the server.
+  Server(Scheduler& scheduler, const std::string& listen, bool insecure);
+  // Stops as stop() does.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+  Server(Server&&) = delete;
+  Server& operator=(Server&&) = delete;
+
+  // What clients connect to: HOST:PORT with the port that is in use, or unix:PATH.
+  [[nodiscard]] const std::string& address() const { return address_; }
+
+  // Ends what is being answered (callers get UNAVAILABLE) and takes no more calls.
+  void stop();
+
+ private:
+  struct Services;
+  std::unique_ptr<Services> services_;
+  std::string address_;
+};
+
+}  // namespace weft::coordinator
