@@ -2,78 +2,37 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <numbers>
+#include <iterator>
 
 #include "core/check.h"
 #include "core/moments.h"
+#include "shading/spherical_harmonics.h"
 
 namespace weft::transport {
 
 namespace {
 
-constexpr std::uint32_t kMaxOrder = 8;
-constexpr std::size_t kMaxCoefficients = (kMaxOrder + 1) * (kMaxOrder + 1);
 constexpr std::size_t kLanes = 8;
 constexpr double kLargestChunkSum = 0x1p25;
 
-using Harmonics = std::array<float, kMaxCoefficients + kLanes>;
+// Coefficients of a direction, zero as far as the stride goes.
+using Harmonics = std::array<float, shading::kShMaxCount + kLanes>;
 
-// K_l^m = sqrt((2l+1)/(4 pi) (l-m)!/(l+m)!), times sqrt 2 for m > 0.
-struct Normalisation {
-  std::array<std::array<float, kMaxOrder + 1>, kMaxOrder + 1> k{};
-
-  Normalisation() {
-    for (std::uint32_t l = 0; l <= kMaxOrder; ++l) {
-      for (std::uint32_t m = 0; m <= l; ++m) {
-        double ratio = (2.0 * l + 1) / (4 * std::numbers::pi);
-        for (std::uint32_t i = l - m + 1; i <= l + m; ++i) {
-          ratio /= i;
-        }
-        k[l][m] = static_cast<float>(std::sqrt(m == 0 ? ratio : 2 * ratio));
-      }
-    }
-  }
-};
-
-// Real orthonormal spherical harmonics without the Condon-Shortley phase, j = l (l + 1) + m, by
-// recurrences free of trigonometry: C_m + i S_m = (x + i y)^m and Q_l^m = P_l^m / sin^m theta.
-void harmonics(glm::vec3 w, std::uint32_t order, Harmonics& y) {
-  static const Normalisation normalisation;
-  float cosine = 1;
-  float sine = 0;
-  float q_mm = 1;
-  for (std::uint32_t m = 0; m <= order; ++m) {
-    float q = q_mm;
-    float q_before = 0;
-    for (std::uint32_t l = m; l <= order; ++l) {
-      const float scaled = normalisation.k[l][m] * q;
-      y[l * (l + 1) + m] = scaled * cosine;
-      if (m > 0) {
-        y[l * (l + 1) - m] = scaled * sine;
-      }
-      const auto fl = static_cast<float>(l);
-      const auto fm = static_cast<float>(m);
-      const float next = ((2 * fl + 1) * w.z * q - (fl + fm) * q_before) / (fl + 1 - fm);
-      q_before = q;
-      q = next;
-    }
-    const float turned = w.x * cosine - w.y * sine;
-    sine = w.x * sine + w.y * cosine;
-    cosine = turned;
-    q_mm *= 2 * static_cast<float>(m) + 1;
-  }
+Harmonics harmonics(glm::vec3 direction, std::size_t count) {
+  const shading::ShVector all = shading::sh_evaluate(direction);
+  Harmonics used{};
+  std::copy_n(std::begin(all.c), count, used.begin());
+  return used;
 }
 
 }  // namespace
 
 ShChunk::ShChunk(std::uint32_t order)
-    : order_(order),
-      coefficients_(std::size_t{order + 1} * (order + 1)),
+    : coefficients_(std::size_t{order + 1} * (order + 1)),
       stride_((coefficients_ + kLanes - 1) / kLanes * kLanes),
       sum_(3 * coefficients_ * stride_),
       sum_of_squares_(3 * coefficients_ * stride_) {
-  CHECK_LE(order, kMaxOrder);
+  CHECK_LE(order, static_cast<std::uint32_t>(shading::kShMaxOrder));
 }
 
 void ShChunk::add(glm::vec3 weight, glm::vec3 row_direction, glm::vec3 column_direction) {
@@ -81,10 +40,8 @@ void ShChunk::add(glm::vec3 weight, glm::vec3 row_direction, glm::vec3 column_di
     return;
   }
   empty_ = false;
-  Harmonics rows{};
-  Harmonics columns{};  // zero beyond the coefficients, as far as the stride goes
-  harmonics(row_direction, order_, rows);
-  harmonics(column_direction, order_, columns);
+  const Harmonics rows = harmonics(row_direction, coefficients_);
+  const Harmonics columns = harmonics(column_direction, coefficients_);
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t row = 0; row < coefficients_; ++row) {
       const float scale = weight[static_cast<int>(c)] * rows[row];

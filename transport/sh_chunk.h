@@ -13,7 +13,7 @@ namespace weft::transport {
 // fixed point. Order matters within a chunk and nowhere else.
 class ShChunk {
  public:
-  // REQUIRES: order <= 8.
+  // REQUIRES: order <= 5.
   explicit ShChunk(std::uint32_t order);
 
   // Entries of a matrix: 3 colours, (order+1)^2 rows, (order+1)^2 columns.
@@ -27,7 +27,6 @@ class ShChunk {
   void flush(std::span<std::int64_t> sum, std::span<std::int64_t> sum_of_squares);
 
  private:
-  std::uint32_t order_;
   std::size_t coefficients_;
   std::size_t stride_;  // coefficients_ rounded up to whole vector registers
   bool empty_ = true;

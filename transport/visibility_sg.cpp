@@ -6,6 +6,7 @@
 
 #include "core/check.h"
 #include "core/random.h"
+#include "shading/visibility.h"
 #include "transport/sphere.h"
 #include "transport/visibility.h"
 
@@ -16,14 +17,11 @@ std::uint16_t sg_rotation(std::uint64_t seed, std::uint32_t segment) {
 }
 
 std::vector<glm::vec3> sg_axes(std::uint32_t count, std::uint16_t rotation) {
+  const float turn = static_cast<float>(rotation) * (shading::kTwoPi / 65536);
   std::vector<glm::vec3> axes;
   axes.reserve(count);
-  for (std::uint32_t q = 1; q <= count; ++q) {
-    const double phi =
-        4 * std::numbers::pi * q / (1 + std::sqrt(5.0)) + 2 * std::numbers::pi * rotation / 65536;
-    const double z = 1 - (q - 0.5) / count;
-    const double r = std::sqrt(1 - z * z);
-    axes.emplace_back(r * std::cos(phi), r * std::sin(phi), z);
+  for (std::uint32_t q = 0; q < count; ++q) {
+    axes.push_back(shading::fibonacci_axis(static_cast<int>(q), static_cast<int>(count), turn));
   }
   return axes;
 }
