@@ -1,0 +1,260 @@
+#include <cmath>
+#include <cstring>
+#include <span>
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/half.h"
+#include "proto/arrays.h"
+#include "tests/transport_tiles.h"
+#include "worker/baker.h"
+
+namespace weft::worker {
+namespace {
+
+constexpr std::uint32_t kResolution = 32;
+constexpr std::uint64_t kVisibilityShards = 6;
+
+bool never() { return false; }
+
+std::string bake(const BakerContext& context, std::uint64_t shard,
+                 const std::string& shard_input = {}) {
+  return make_baker(context)->bake(shard, shard_input, never);
+}
+
+fabric::Tile tile_of_test() {
+  fabric::Tile tile = test::crossed_layers(4, 8, 0.02f, 6);
+  tile.blocks = {2, 1};
+  return tile;
+}
+
+BakerContext grid_context() {
+  BakerContext context;
+  context.spec.mutable_grid()->set_cell_length_mfp(2);
+  context.spec.mutable_grid()->set_rays(4096);
+  context.spec.mutable_grid()->set_seed(5);
+  context.shard_count = 1;
+  context.inputs = {fabric::encode_tile(tile_of_test())};
+  return context;
+}
+
+BakerContext visibility_context() {
+  BakerContext context;
+  context.spec.mutable_visibility()->set_resolution(kResolution);
+  context.shard_count = kVisibilityShards;
+  context.inputs = {fabric::encode_tile(tile_of_test())};
+  return context;
+}
+
+BakerContext basis_context() {
+  BakerContext context;
+  context.spec.mutable_basis()->set_resolution(kResolution);
+  context.spec.mutable_basis()->set_components(24);
+  context.spec.mutable_basis()->set_seed(2);
+  context.shard_count = 1;
+  const auto baker = make_baker(visibility_context());
+  for (std::uint64_t shard = 0; shard < kVisibilityShards - 1; ++shard) {
+    context.inputs.push_back(baker->bake(shard, {}, never));
+  }
+  return context;
+}
+
+BakerContext transfer_context(v1::TransferEstimator estimator = v1::TRANSFER_ESTIMATOR_EXIT) {
+  BakerContext context;
+  v1::TransferSpec& spec = *context.spec.mutable_transfer();
+  spec.set_sh_order(2);
+  spec.set_paths_per_cell(700);
+  spec.set_paths_per_shard(256);
+  spec.set_estimator(estimator);
+  spec.set_seed(3);
+  spec.set_max_path_length(1000);
+  v1::Material& material = *spec.add_materials();
+  for (v1::Rgb* rgb : {material.mutable_c_r(), material.mutable_c_tt()}) {
+    rgb->set_r(0.2);
+    rgb->set_g(0.4);
+    rgb->set_b(0.6);
+  }
+  material.set_beta_r_deg(8);
+  material.set_beta_tt_deg(10);
+  material.set_gamma_tt_deg(25);
+  const std::string grid = bake(grid_context(), 0);
+  std::vector<std::uint64_t> shape;
+  static_cast<void>(
+      v1::array_of<std::uint32_t>(v1::parse_arrays(grid), "cell_coordinates", &shape));
+  context.shard_count = shape[0] * 3;
+  context.inputs = {grid_context().inputs[0], grid};
+  return context;
+}
+
+TEST(WorkerBaker, Grid_HasWhatItsSpecPromises) {
+  const v1::Arrays result = v1::parse_arrays(bake(grid_context(), 0));
+  const auto path = v1::array_of<float>(result, "mean_free_path_mm");
+  ASSERT_EQ(path.size(), 1u);
+  EXPECT_GT(path[0], 0.01f);
+  EXPECT_LT(path[0], 1.0f);
+  const auto per_axis = v1::array_of<std::uint32_t>(result, "cells_per_axis");
+  ASSERT_EQ(per_axis.size(), 3u);
+  EXPECT_EQ(per_axis[0], 2 * std::max(1.0f, std::round(0.5f / (2 * path[0]))));
+  const auto cells = v1::array_of<std::uint32_t>(result, "cell_of_segment");
+  EXPECT_EQ(cells.size(), tile_of_test().segment_count());
+}
+
+TEST(WorkerBaker, Visibility_IsAStratifiedSampleOfTheTile) {
+  const std::uint32_t segments = tile_of_test().segment_count();
+  const auto baker = make_baker(visibility_context());
+  std::uint64_t total = 0;
+  for (std::uint64_t shard = 0; shard < kVisibilityShards; ++shard) {
+    std::vector<std::uint64_t> shape;
+    const std::string result = baker->bake(shard, {}, never);
+    const auto bits = v1::array_of<std::uint8_t>(v1::parse_arrays(result), "bits", &shape);
+    ASSERT_EQ(shape.size(), 2u);
+    EXPECT_EQ(shape[0], (segments - shard + kVisibilityShards - 1) / kVisibilityShards);
+    EXPECT_EQ(shape[1], kResolution * kResolution / 8);
+    total += shape[0];
+    EXPECT_EQ(result, baker->bake(shard, {}, never));
+  }
+  EXPECT_EQ(total, segments);
+}
+
+TEST(WorkerBaker, Coefficients_GiveMostSignsBack) {
+  const std::string basis = bake(basis_context(), 0);
+  const auto variance = v1::array_of<float>(v1::parse_arrays(basis), "variance");
+  ASSERT_EQ(variance.size(), 24u);
+  for (std::size_t i = 1; i < variance.size(); ++i) {
+    EXPECT_LE(variance[i], variance[i - 1] * 1.0001f);
+  }
+  BakerContext context;
+  v1::CoefficientsSpec& spec = *context.spec.mutable_coefficients();
+  spec.set_resolution(kResolution);
+  spec.set_sg_count(16);
+  spec.set_sg_sharpness(128);
+  spec.set_rotation_seed(77);
+  context.shard_count = kVisibilityShards;
+  context.inputs = {basis};
+  // The last shard is one that the basis did not read.
+  const std::uint64_t shard = kVisibilityShards - 1;
+  const std::string visibility = bake(visibility_context(), shard);
+  const v1::Arrays result = v1::parse_arrays(bake(context, shard, visibility));
+  std::vector<std::uint64_t> shape;
+  const auto ssdf = v1::array_of<v1::Half>(result, "ssdf", &shape);
+  ASSERT_EQ(shape, (std::vector<std::uint64_t>{shape[0], 24}));
+  const std::uint64_t count = shape[0];
+  const auto ssg = v1::array_of<v1::Half>(result, "ssg", &shape);
+  EXPECT_EQ(shape, (std::vector<std::uint64_t>{count, 16}));
+  const auto rotation = v1::array_of<std::uint32_t>(result, "rotation");
+  ASSERT_EQ(rotation.size(), count);
+  EXPECT_NE(rotation[0], rotation[1]);
+  const auto open = v1::array_of<v1::Half>(result, "open_share");
+  ASSERT_EQ(open.size(), count);
+  const auto errors = v1::array_of<std::uint32_t>(result, "sign_errors");
+  ASSERT_EQ(errors.size(), 2u);
+  EXPECT_GT(errors[1], 0u);
+  EXPECT_LT(errors[0], errors[1] / 20);
+
+  // The Gaussians hold the open solid angle of the upper hemisphere: no more than is open at all.
+  for (std::uint64_t i = 0; i < count; ++i) {
+    float sum = 0;
+    for (std::size_t q = 0; q < 16; ++q) {
+      sum += core::float_from_half(ssg[i * 16 + q].bits);
+    }
+    EXPECT_LE(sum, 12.567f * core::float_from_half(open[i].bits) + 0.01f);
+  }
+}
+
+TEST(WorkerBaker, Transfer_CutsACellIntoBlocks) {
+  const BakerContext context = transfer_context();
+  const auto baker = make_baker(context);
+  std::uint64_t paths = 0;
+  for (std::uint64_t block = 0; block < 3; ++block) {
+    const v1::Arrays result = v1::parse_arrays(baker->bake(3 + block, {}, never));
+    paths += v1::array_of<std::uint64_t>(result, "paths").at(0);
+    std::vector<std::uint64_t> shape;
+    const auto sum = v1::array_of<std::int64_t>(result, "sum", &shape);
+    EXPECT_EQ(shape, (std::vector<std::uint64_t>{3, 9, 9}));
+    EXPECT_GT(sum[0], 0);
+    // A brighter blue.
+    EXPECT_GT(sum[2 * 81], sum[0]);
+    EXPECT_GT(v1::array_of<std::int64_t>(result, "sum_of_squares").at(0), 0);
+  }
+  EXPECT_EQ(paths, 700u);
+}
+
+TEST(WorkerBaker, EveryKind_StopsWhenTold) {
+  BakerContext coefficients;
+  coefficients.spec.mutable_coefficients()->set_resolution(kResolution);
+  coefficients.spec.mutable_coefficients()->set_sg_count(4);
+  coefficients.shard_count = kVisibilityShards;
+  const BakerContext basis = basis_context();
+  coefficients.inputs = {bake(basis, 0)};
+  BakerContext transfer = transfer_context();
+  for (const BakerContext& context :
+       {grid_context(), visibility_context(), basis, coefficients, transfer}) {
+    const auto baker = make_baker(context);
+    const std::string& input = basis.inputs[0];
+    try {
+      static_cast<void>(baker->bake(0, input, [] { return true; }));
+      FAIL() << context.spec.ShortDebugString();
+    } catch (const core::Error& error) {
+      EXPECT_EQ(error.code(), core::Code::kCancelled);
+    }
+  }
+}
+
+void expect_refused(const BakerContext& context, core::Code code) {
+  try {
+    static_cast<void>(bake(context, 0));
+    FAIL() << context.spec.ShortDebugString();
+  } catch (const core::Error& error) {
+    EXPECT_EQ(error.code(), code) << error.what();
+  }
+}
+
+TEST(WorkerBaker, NonsenseSpecs_AreRefused) {
+  expect_refused({}, core::Code::kInvalidArgument);
+  BakerContext context = grid_context();
+  context.spec.mutable_grid()->set_rays(0);
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = grid_context();
+  context.spec.mutable_grid()->set_cell_length_mfp(std::nan(""));
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = visibility_context();
+  context.spec.mutable_visibility()->set_resolution(100);
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = visibility_context();
+  context.inputs.clear();
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = transfer_context();
+  context.spec.mutable_transfer()->clear_materials();
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = transfer_context();
+  context.spec.mutable_transfer()->mutable_materials(0)->set_beta_r_deg(-1);
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = transfer_context();
+  ++context.shard_count;
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = grid_context();
+  context.shard_count = 0;
+  expect_refused(context, core::Code::kInvalidArgument);
+}
+
+TEST(WorkerBaker, DamagedInputs_AreDataLoss) {
+  BakerContext context = visibility_context();
+  context.inputs[0].resize(context.inputs[0].size() / 2);
+  expect_refused(context, core::Code::kDataLoss);
+  context = basis_context();
+  context.spec.mutable_basis()->set_resolution(2 * kResolution);
+  expect_refused(context, core::Code::kDataLoss);
+  context = transfer_context();
+  context.inputs[1] = context.inputs[0];
+  expect_refused(context, core::Code::kDataLoss);
+}
+
+TEST(WorkerFingerprint, IsTheSameEveryTime) {
+  const core::Digest once = numerics_fingerprint();
+  EXPECT_EQ(once, numerics_fingerprint());
+  EXPECT_NE(once, core::Digest{});
+}
+
+}  // namespace
+}  // namespace weft::worker
