@@ -13,6 +13,7 @@
 #include "fabric/explicit_fibres.h"
 #include "fabric/fibres.h"
 #include "fabric/layout.h"
+#include "fabric/relax.h"
 #include "fabric/thread_path.h"
 
 namespace weft::fabric {
@@ -32,6 +33,19 @@ void refuse_if_too_large(const TileEstimate& estimate) {
                   static_cast<double>(estimate.memory_bytes) / kMebibyte,
                   static_cast<double>(kTileLimitBytes) / kMebibyte);
     throw core::Error(core::Code::kResourceExhausted, text.data());
+  }
+}
+
+void refuse_if_overlapping(const RelaxReport& report) {
+  if (report.overlap_share > kOverlapTolerance) {
+    std::array<char, 300> text{};
+    std::snprintf(
+        text.data(), text.size(),
+        "the yarns have no room: after %u iterations two of them still overlap by %.1f %% "
+        "of the thinner one's radius (allowed: %.1f %%); use fewer threads per cm, "
+        "thinner yarns or more flattening",
+        report.iterations, 100 * report.overlap_share, 100 * kOverlapTolerance);
+    throw core::Error(core::Code::kInvalidArgument, text.data());
   }
 }
 
@@ -92,7 +106,9 @@ Tile build_tile(const v1::FabricDescription& description) {
   } else {
     const glm::uvec2 repeats{description.exemplar().repeats_x(),
                              description.exemplar().repeats_y()};
-    const YarnLayout layout = repeat_layout(lay_out(description), repeats);
+    YarnLayout repeat = lay_out(description);
+    refuse_if_overlapping(relax(repeat));
+    const YarnLayout layout = repeat_layout(repeat, repeats);
     tile.size_mm = glm::vec2(layout.size_mm);
     tile.blocks = repeats;
     lay_threads(description, layout, tile);
