@@ -1,0 +1,173 @@
+#include "render/build_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "core/error.h"
+#include "render/flat_cloth.h"
+#include "render/image.h"
+#include "render/scene_description.h"
+#include "render/sphere_sampling.h"
+
+namespace weft::render {
+namespace {
+
+constexpr double kDefaultSwatchMm = 4;
+constexpr double kDefaultAngleDeg = 30;
+constexpr double kDefaultSharpness = 50;
+
+glm::dvec3 vector_of(const v1::Vector& v) { return {v.x(), v.y(), v.z()}; }
+
+glm::vec3 colour_or(bool given, const v1::Colour& colour, double otherwise) {
+  return given ? glm::vec3(glm::dvec3(colour.r(), colour.g(), colour.b()))
+               : glm::vec3(static_cast<float>(otherwise));
+}
+
+Light area_light(const v1::AreaLight& area) {
+  const glm::vec3 radiance = colour_or(area.has_radiance(), area.radiance(), 1);
+  if (area.has_rectangle()) {
+    const v1::Rectangle& rectangle = area.rectangle();
+    return RectangleLight{vector_of(rectangle.corner()), vector_of(rectangle.edge_a()),
+                          vector_of(rectangle.edge_b()), radiance};
+  }
+  return DiscLight{vector_of(area.disc().centre()), glm::normalize(vector_of(area.disc().normal())),
+                   area.disc().radius_mm(), radiance};
+}
+
+Light light_of(const v1::Light& light, bool cut_at_horizon) {
+  switch (light.kind_case()) {
+    case v1::Light::kSg: {
+      const v1::SgLight& sg = light.sg();
+      return SgLight{glm::normalize(vector_of(sg.towards())),
+                     sg.sharpness() > 0 ? sg.sharpness() : kDefaultSharpness,
+                     colour_or(sg.has_irradiance(), sg.irradiance(), kPi), cut_at_horizon};
+    }
+    case v1::Light::kPoint:
+      return PointLight{vector_of(light.point().position()),
+                        colour_or(true, light.point().intensity(), 0)};
+    case v1::Light::kArea:
+      return area_light(light.area());
+    case v1::Light::kEnvironment: {
+      const v1::EnvironmentLight& environment = light.environment();
+      const glm::vec3 radiance = colour_or(environment.has_radiance(), environment.radiance(), 1);
+      if (environment.exr_file().empty()) {
+        return UniformLight{radiance, cut_at_horizon};
+      }
+      return EnvironmentLight{
+          std::make_shared<Environment>(read_exr(environment.exr_file()), radiance,
+                                        environment.turn_deg() * kPi / 180),
+          cut_at_horizon};
+    }
+    default:  // the description was checked: a light has a kind
+      return DirectionalLight{
+          glm::normalize(vector_of(light.directional().towards())),
+          colour_or(light.directional().has_irradiance(), light.directional().irradiance(), kPi)};
+  }
+}
+
+double swatch_size(double size_mm, double tiles, double tile_mm) {
+  if (size_mm > 0) {
+    return size_mm;
+  }
+  return tile_mm * (tiles > 0 ? tiles : std::ceil(kDefaultSwatchMm / tile_mm));
+}
+
+std::unique_ptr<Cloth> cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric) {
+  const v1::FlatSwatch& flat = cloth.flat();
+  const glm::dvec2 tile_mm(fabric->tile().size_mm);
+  FlatPlacement placement;
+  placement.size_mm = {swatch_size(flat.size_x_mm(), flat.tiles_x(), tile_mm.x),
+                       swatch_size(flat.size_y_mm(), flat.tiles_y(), tile_mm.y)};
+  placement.endless = flat.endless();
+  placement.turn = flat.turn_deg() * kPi / 180;
+  placement.centre_mm = {flat.centre_x_mm(), flat.centre_y_mm(), flat.centre_z_mm()};
+  placement.black_underlay = cloth.black_underlay();
+  return make_flat_cloth(std::move(fabric), placement);
+}
+
+Cloth::Bounds bounds_of(const std::vector<std::unique_ptr<Cloth>>& cloths) {
+  Cloth::Bounds all = cloths.front()->bounds();
+  for (const auto& cloth : cloths) {
+    const Cloth::Bounds bounds = cloth->bounds();
+    all.low_mm = glm::min(all.low_mm, bounds.low_mm);
+    all.high_mm = glm::max(all.high_mm, bounds.high_mm);
+  }
+  return all;
+}
+
+// From aslant, so near that flat cloth fills the picture and a draped one just fits.
+void frame(const v1::Scene& description, const Cloth::Bounds& bounds, Camera::View& view) {
+  const bool all_flat = std::all_of(description.cloths().begin(), description.cloths().end(),
+                                    [](const v1::Cloth& cloth) { return cloth.has_flat(); });
+  const glm::dvec3 size = bounds.high_mm - bounds.low_mm;
+  view.look_at_mm = 0.5 * (bounds.low_mm + bounds.high_mm);
+  const double shown_mm = all_flat ? 0.7 * std::min(size.x, size.y) : glm::length(size);
+  if (!view.perspective && !(view.height > 0)) {
+    view.height = shown_mm;
+  }
+  const double distance_mm = view.perspective ? shown_mm / view.height : 10 * shown_mm;
+  view.position_mm = view.look_at_mm + distance_mm * glm::normalize(glm::dvec3(0.2, -0.75, 1.1));
+}
+
+Camera camera_of(const v1::Scene& description, const Cloth::Bounds& bounds) {
+  const v1::Camera& camera = description.camera();
+  Camera::View view;
+  view.perspective = !camera.has_orthographic();
+  if (view.perspective) {
+    const double angle_deg = camera.perspective().vertical_angle_deg() > 0
+                                 ? camera.perspective().vertical_angle_deg()
+                                 : kDefaultAngleDeg;
+    view.height = 2 * std::tan(0.5 * angle_deg * kPi / 180);
+  } else {
+    view.height = camera.orthographic().height_mm();
+  }
+  if (camera.has_position()) {
+    view.position_mm = vector_of(camera.position());
+    view.look_at_mm = vector_of(camera.look_at());
+    if (!view.perspective && !(view.height > 0)) {
+      view.height =
+          0.7 * std::min(bounds.high_mm.x - bounds.low_mm.x, bounds.high_mm.y - bounds.low_mm.y);
+    }
+  } else {
+    frame(description, bounds, view);
+  }
+  if (camera.has_up()) {
+    view.up = vector_of(camera.up());
+  } else {
+    const glm::dvec3 sight = glm::normalize(view.look_at_mm - view.position_mm);
+    const bool level = std::hypot(sight.x, sight.y) > 1e-6;
+    view.up = level ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+  }
+  const v1::Picture& picture = description.picture();
+  return {view, static_cast<double>(picture.width()) / picture.height()};
+}
+
+}  // namespace
+
+Scene build_scene(const v1::Scene& description, const FabricSource& fabrics) {
+  v1::Scene whole = description;
+  const v1::Scene otherwise = default_scene();
+  if (whole.lights_size() == 0) {
+    *whole.mutable_lights() = otherwise.lights();
+  }
+  if (whole.cloths_size() == 0) {
+    *whole.mutable_cloths() = otherwise.cloths();
+  }
+  Scene scene;
+  for (const v1::Light& light : whole.lights()) {
+    scene.lights.push_back(light_of(light, whole.cut_lights_at_horizon()));
+  }
+  for (const v1::Cloth& cloth : whole.cloths()) {
+    scene.cloths.push_back(cloth_of(cloth, fabrics(cloth.fabric())));
+  }
+  scene.camera = camera_of(whole, bounds_of(scene.cloths));
+  scene.background = colour_or(true, whole.picture().background(), 0);
+  return scene;
+}
+
+}  // namespace weft::render
