@@ -143,6 +143,12 @@ Camera camera_of(const v1::Scene& description, const Cloth::Bounds& bounds) {
     const bool level = std::hypot(sight.x, sight.y) > 1e-6;
     view.up = level ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
   }
+  const glm::dvec3 across =
+      glm::cross(glm::normalize(view.look_at_mm - view.position_mm), glm::normalize(view.up));
+  if (!(glm::length(across) > 1e-6)) {
+    throw core::Error(core::Code::kInvalidArgument,
+                      "camera.up lies along the line of sight; give a direction across it");
+  }
   const v1::Picture& picture = description.picture();
   return {view, static_cast<double>(picture.width()) / picture.height()};
 }

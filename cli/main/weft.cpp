@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   cli::add_fetch(app);
   cli::add_inspect(app);
   cli::add_verify(app);
+  cli::add_render(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
