@@ -27,6 +27,7 @@
 #include "render/load_fabric.h"
 #include "render/path_integrator.h"
 #include "render/png.h"
+#include "render/precomputed_integrator.h"
 #include "render/scene_description.h"
 
 namespace weft::cli {
@@ -67,8 +68,10 @@ struct RenderOptions {
 // The fabrics of one scene, each loaded once.
 class Shelf {
  public:
-  Shelf(std::string main_reference, std::string coordinator)
-      : main_reference_(std::move(main_reference)), coordinator_(std::move(coordinator)) {}
+  Shelf(std::string main_reference, std::string coordinator, render::Fabric::Wanted wanted)
+      : main_reference_(std::move(main_reference)),
+        coordinator_(std::move(coordinator)),
+        wanted_(wanted) {}
 
   const render::LoadedFabric& take(const std::string& reference) {
     const std::string& named = reference.empty() ? main_reference_ : reference;
@@ -78,7 +81,7 @@ class Shelf {
     }
     const std::filesystem::path path =
         render::is_description(named) ? named : resolve_fabric(named, coordinator_).string();
-    return fabrics_.emplace(named, render::load_fabric(path)).first->second;
+    return fabrics_.emplace(named, render::load_fabric(path, wanted_)).first->second;
   }
   [[nodiscard]] const std::map<std::string, render::LoadedFabric>& fabrics() const {
     return fabrics_;
@@ -87,6 +90,7 @@ class Shelf {
  private:
   std::string main_reference_;
   std::string coordinator_;
+  render::Fabric::Wanted wanted_;
   std::map<std::string, render::LoadedFabric> fabrics_;
 };
 
@@ -160,7 +164,7 @@ std::unique_ptr<render::Integrator> integrator_for(const v1::Scene& described,
     settings.scattering = scattering_of(integration);
     return std::make_unique<render::PathIntegrator>(scene, settings);
   }
-  throw core::Error(core::Code::kInvalidArgument, "say --integrator path");
+  return std::make_unique<render::PrecomputedIntegrator>(scene, scattering_of(integration));
 }
 
 std::string json_of(const google::protobuf::Message& message) {
@@ -259,7 +263,10 @@ void run(const RenderOptions& options) {
   }
   const v1::Scene described = described_scene(options);
   const core::Stopwatch loading;
-  Shelf shelf(options.fabric, options.coordinator);
+  const bool precomputed = described.integration().integrator() == v1::INTEGRATOR_PRECOMPUTED;
+  Shelf shelf(
+      options.fabric, options.coordinator,
+      precomputed ? render::Fabric::Wanted::kFibresAndTransfer : render::Fabric::Wanted::kFibres);
   const render::Scene scene = render::build_scene(
       described, [&](const std::string& reference) { return shelf.take(reference).fabric; });
   const std::unique_ptr<render::Integrator> integrator = integrator_for(described, scene);

@@ -83,6 +83,9 @@ class Cloth {
   [[nodiscard]] virtual std::optional<glm::dvec3> top_point(const FibreHit& hit,
                                                             const glm::dvec2& offset_mm) const = 0;
 
+  // FibreHit::to_flat when it is the same at every hit.
+  [[nodiscard]] virtual std::optional<glm::mat3> constant_rotation() const = 0;
+
   // A box around the piece, for framing; an endless piece gives a part of it.
   struct Bounds {
     glm::dvec3 low_mm;

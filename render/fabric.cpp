@@ -62,14 +62,18 @@ fabric::Tile tile_of(const storage::FabricDatabase& database) {
   return tile;
 }
 
-std::unique_ptr<Fabric> Fabric::from_database(const storage::FabricDatabase& database) {
+std::unique_ptr<Fabric> Fabric::from_database(storage::FabricDatabase database, Wanted wanted) {
   require(database.materials.size() == database.material_names.size(),
           "its materials and their names differ in number");
   std::vector<shading::FibreBcsdf> bcsdfs;
   for (const shading::FibreMaterial& material : database.materials) {
     bcsdfs.emplace_back(material);
   }
-  return std::make_unique<Fabric>(tile_of(database), std::move(bcsdfs));
+  auto result = std::make_unique<Fabric>(tile_of(database), std::move(bcsdfs));
+  if (wanted == Wanted::kFibresAndTransfer) {
+    result->precomputed_ = std::make_unique<PrecomputedFabric>(std::move(database));
+  }
+  return result;
 }
 
 }  // namespace weft::render

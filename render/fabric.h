@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "fabric/tile.h"
+#include "render/precomputed_fabric.h"
 #include "shading/fibre_bcsdf.h"
 #include "storage/fabric_database.h"
 #include "transport/scene.h"
@@ -18,20 +19,24 @@ class Fabric {
   // what transport::Scene throws.
   Fabric(fabric::Tile tile, std::vector<shading::FibreBcsdf> bcsdfs);
 
-  // The tile and the materials of a database. Throws core::Error(kDataLoss) when its arrays
-  // contradict one another.
-  [[nodiscard]] static std::unique_ptr<Fabric> from_database(
-      const storage::FabricDatabase& database);
+  // The tile and the materials of a database, and its precomputed visibility and transfer where
+  // they are wanted. Throws core::Error(kDataLoss) when its arrays contradict one another.
+  enum class Wanted { kFibres, kFibresAndTransfer };
+  [[nodiscard]] static std::unique_ptr<Fabric> from_database(storage::FabricDatabase database,
+                                                             Wanted wanted);
 
   [[nodiscard]] const fabric::Tile& tile() const { return tile_; }
   [[nodiscard]] const transport::Scene& scene() const { return scene_; }
   [[nodiscard]] const shading::FibreBcsdf& bcsdf_of_strand(std::uint32_t strand) const {
     return bcsdfs_[tile_.strands[strand].material];
   }
+  // Nothing when it was not wanted, or there is none.
+  [[nodiscard]] const PrecomputedFabric* precomputed() const { return precomputed_.get(); }
 
  private:
   fabric::Tile tile_;
   std::vector<shading::FibreBcsdf> bcsdfs_;
+  std::unique_ptr<const PrecomputedFabric> precomputed_;
   transport::Scene scene_;  // refers to tile_; a Fabric never moves
 };
 

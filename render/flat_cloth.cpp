@@ -96,6 +96,10 @@ class FlatCloth : public Cloth {
     return glm::transpose(to_flat_) * flat + placement_.centre_mm;
   }
 
+  [[nodiscard]] std::optional<glm::mat3> constant_rotation() const override {
+    return glm::mat3(to_flat_);
+  }
+
   [[nodiscard]] Bounds bounds() const override {
     const glm::dvec2 half = 0.5 * placement_.size_mm;
     const double c = std::fabs(std::cos(placement_.turn));

@@ -56,18 +56,24 @@ std::unique_ptr<Fabric> build_fabric(const v1::FabricDescription& description) {
   return std::make_unique<Fabric>(std::move(tile), std::move(bcsdfs));
 }
 
-LoadedFabric load_fabric(const std::filesystem::path& path) {
+LoadedFabric load_fabric(const std::filesystem::path& path, Fabric::Wanted wanted) {
   LoadedFabric loaded;
   if (is_description(path)) {
+    if (wanted == Fabric::Wanted::kFibresAndTransfer) {
+      throw core::Error(core::Code::kInvalidArgument,
+                        path.string() +
+                            ": a description has nothing precomputed; make a database of it with "
+                            "weft run, or draw it with --integrator path");
+    }
     const v1::FabricDescription description = fabric::load_description(path);
     loaded.name = description.name();
     loaded.fabric = build_fabric(description);
     return loaded;
   }
-  const storage::FabricDatabase database = storage::read_database(path);
+  storage::FabricDatabase database = storage::read_database(path);
   loaded.name = name_in(database.description_json);
   loaded.content_digest = storage::content_digest(path).hex();
-  loaded.fabric = Fabric::from_database(database);
+  loaded.fabric = Fabric::from_database(std::move(database), wanted);
   return loaded;
 }
 

@@ -21,7 +21,7 @@ struct LoadedFabric {
 
 // Reads a fabric database, or builds the fibres of a description: enough for the path integrator,
 // which needs nothing precomputed. Throws core::Error.
-[[nodiscard]] LoadedFabric load_fabric(const std::filesystem::path& path);
+[[nodiscard]] LoadedFabric load_fabric(const std::filesystem::path& path, Fabric::Wanted wanted);
 
 // The fabric of a canonical description.
 [[nodiscard]] std::unique_ptr<Fabric> build_fabric(const v1::FabricDescription& description);

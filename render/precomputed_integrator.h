@@ -1,0 +1,48 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "render/integrator.h"
+#include "render/precomputed_fabric.h"
+#include "render/scene.h"
+
+namespace weft::render {
+
+// Shades every fibre that an eye ray meets from the fabric's database (Khungurn et al. 2017,
+// section 5): visibility and transfer of the cloth around it are looked up, and only occlusion by
+// cloth as a whole is traced, from the upper surface above the hit. Directional and spherical
+// Gaussian lights are shaded in closed form, point lights as directional ones from the hit, area
+// and environment lights by drawn directions (section 5.2.1). Keeps a reference to `scene`, which
+// must outlive it.
+class PrecomputedIntegrator : public Integrator {
+ public:
+  // REQUIRES: every piece of cloth has a fabric with something precomputed.
+  PrecomputedIntegrator(const Scene& scene, Scattering scattering);
+  [[nodiscard]] EyeSample trace(const Ray& ray, core::Random& random) const override;
+
+ private:
+  struct Shaded;
+  struct Arrival;
+  [[nodiscard]] glm::vec3 from_light(const Shaded& at, std::size_t light,
+                                     core::Random& random) const;
+  [[nodiscard]] glm::vec3 from_gaussian(const Shaded& at, std::size_t light,
+                                        core::Random& random) const;
+  [[nodiscard]] glm::vec3 from_drawn(const Shaded& at, std::size_t light,
+                                     core::Random& random) const;
+  [[nodiscard]] glm::vec3 from_fibre_direction(const Shaded& at, const Light& light,
+                                               core::Random& random) const;
+  [[nodiscard]] bool reaches(const glm::dvec3& from_mm, const Arrival& arrival) const;
+  [[nodiscard]] glm::dvec3 neighbour(const Shaded& at, core::Random& random) const;
+  [[nodiscard]] glm::vec3 multiple(const Shaded& at, std::size_t light,
+                                   const shading::ShVector& harmonics) const;
+  [[nodiscard]] const CellRadiance* cells(std::size_t cloth, std::size_t light) const;
+
+  const Scene& scene_;
+  Scattering scattering_;
+  // [cloths, lights]: after the transfer, where the light's direction in the flat fabric is the
+  // same everywhere.
+  std::vector<std::optional<CellRadiance>> cells_;
+};
+
+}  // namespace weft::render
