@@ -1,0 +1,177 @@
+#include "worker/attempt_table.h"
+
+#include <algorithm>
+
+#include "core/check.h"
+#include "proto/limits.h"
+
+namespace weft::worker {
+
+namespace {
+
+// What is wrong with an assignment; empty when it can be run.
+std::string mistake_in(const v1::Assignment& assignment) {
+  constexpr int kDigestBytes = 32;
+  const auto is_digest = [](const std::string& bytes) { return bytes.size() == kDigestBytes; };
+  if (assignment.shards() == 0 || assignment.first_shard() >= assignment.shard_count() ||
+      assignment.shards() > assignment.shard_count() - assignment.first_shard()) {
+    return "the assignment's run of shards is not within its stage";
+  }
+  if (!assignment.shard_inputs().empty() &&
+      static_cast<std::uint64_t>(assignment.shard_inputs_size()) != assignment.shards()) {
+    return "the assignment has not one shard input for each shard";
+  }
+  if (!std::all_of(assignment.inputs().begin(), assignment.inputs().end(), is_digest) ||
+      !std::all_of(assignment.shard_inputs().begin(), assignment.shard_inputs().end(), is_digest)) {
+    return "an input of the assignment is not named by a digest";
+  }
+  return "";
+}
+
+bool has_name(const Attempt& attempt, const v1::AttemptName& name) {
+  return attempt.assignment.name().attempt() == name.attempt() &&
+         attempt.assignment.name().job_id() == name.job_id();
+}
+
+}  // namespace
+
+void AttemptTable::fill(v1::SynchronizeRequest& request) const {
+  std::uint64_t held = 0;
+  for (const auto& attempt : attempts_) {
+    if (attempt->is_revoked) {
+      continue;
+    }
+    ++held;
+    v1::RunningAttempt& running = *request.add_running();
+    running.set_job_id(attempt->assignment.name().job_id());
+    running.set_attempt(attempt->assignment.name().attempt());
+    running.set_lease_token(attempt->assignment.lease_token());
+    running.set_shards_done(attempt->results.size());
+  }
+  for (const auto& [name, completion] : completions_) {
+    if (request.completions_size() == v1::kCompletionLimit) {
+      break;
+    }
+    *request.add_completions() = completion;
+  }
+  const std::uint64_t wanted = std::uint64_t{threads_} + 1;
+  const bool takes_more = !is_draining_ && held < wanted &&
+                          completions_.size() < static_cast<std::size_t>(v1::kCompletionLimit) / 2;
+  request.set_free_attempts(takes_more ? static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                                             wanted - held, v1::kFreeAttemptsLimit))
+                                       : 0);
+}
+
+AttemptTable::Changes AttemptTable::apply(const v1::SynchronizeResponse& response) {
+  Changes changes;
+  for (const v1::AttemptName& name : response.acknowledged()) {
+    changes.acknowledged += completions_.erase({name.job_id(), name.attempt()});
+  }
+  for (const v1::AttemptName& name : response.stop()) {
+    const auto found = std::find_if(attempts_.begin(), attempts_.end(),
+                                    [&](const auto& attempt) { return has_name(*attempt, name); });
+    if (found != attempts_.end() && !(*found)->is_revoked) {
+      const std::shared_ptr<Attempt> attempt = *found;
+      attempt->is_revoked = true;
+      close(*attempt);
+      end_if_over(attempt);
+      changes.revoked.push_back(attempt);
+    }
+  }
+  for (const v1::Assignment& assignment : response.assignments()) {
+    const v1::AttemptName& name = assignment.name();
+    const bool is_known = completions_.count({name.job_id(), name.attempt()}) > 0 ||
+                          std::any_of(attempts_.begin(), attempts_.end(), [&](const auto& attempt) {
+                            return has_name(*attempt, name);
+                          });
+    if (is_known || is_draining_) {
+      continue;
+    }
+    auto attempt = std::make_shared<Attempt>();
+    attempt->assignment = assignment;
+    attempts_.push_back(attempt);
+    changes.assigned.push_back(attempt);
+    if (const std::string mistake = mistake_in(assignment); !mistake.empty()) {
+      attempt->error.emplace();
+      attempt->error->set_kind(v1::ERROR_KIND_TASK_FAILED);
+      attempt->error->set_shard(assignment.first_shard());
+      attempt->error->set_message(mistake);
+      close(*attempt);
+      end_if_over(attempt);
+    }
+  }
+  return changes;
+}
+
+std::optional<ShardClaim> AttemptTable::claim() {
+  for (const auto& attempt : attempts_) {
+    if (!attempt->is_closing && attempt->begun < attempt->assignment.shards()) {
+      ++attempt->in_progress;
+      return ShardClaim{attempt, attempt->assignment.first_shard() + attempt->begun++};
+    }
+  }
+  return std::nullopt;
+}
+
+bool AttemptTable::delivered(const ShardClaim& claim, v1::ShardResult result) {
+  claim.attempt->results.push_back(std::move(result));
+  return given_up(claim);
+}
+
+bool AttemptTable::failed(const ShardClaim& claim, v1::TaskError error) {
+  if (!claim.attempt->error) {
+    claim.attempt->error = std::move(error);
+  }
+  close(*claim.attempt);
+  return given_up(claim);
+}
+
+bool AttemptTable::given_up(const ShardClaim& claim) {
+  CHECK_GT(claim.attempt->in_progress, 0U);
+  --claim.attempt->in_progress;
+  return end_if_over(claim.attempt);
+}
+
+void AttemptTable::drain() {
+  is_draining_ = true;
+  const std::vector<std::shared_ptr<Attempt>> attempts = attempts_;
+  for (const auto& attempt : attempts) {
+    close(*attempt);
+    end_if_over(attempt);
+  }
+}
+
+void AttemptTable::close(Attempt& attempt) {
+  attempt.is_closing = true;
+  attempt.should_stop.store(true);
+}
+
+bool AttemptTable::end_if_over(const std::shared_ptr<Attempt>& attempt) {
+  const bool has_more = !attempt->is_closing && attempt->begun < attempt->assignment.shards();
+  const auto found = std::find(attempts_.begin(), attempts_.end(), attempt);
+  if (has_more || attempt->in_progress > 0 || found == attempts_.end()) {
+    return false;
+  }
+  attempts_.erase(found);
+  // Of an attempt that is not ours any more only finished shards are of use to anybody.
+  if (attempt->is_revoked && attempt->results.empty()) {
+    return true;
+  }
+  const v1::AttemptName& name = attempt->assignment.name();
+  v1::Completion completion;
+  completion.set_job_id(name.job_id());
+  completion.set_attempt(name.attempt());
+  completion.set_lease_token(attempt->assignment.lease_token());
+  for (const v1::ShardResult& result : attempt->results) {
+    *completion.add_results() = result;
+  }
+  if (attempt->error && !attempt->is_revoked) {
+    *completion.mutable_error() = *attempt->error;
+  }
+  completion.set_prepare_ms(attempt->prepare_ms);
+  completion.set_work_ms(attempt->work_ms);
+  completions_[{name.job_id(), name.attempt()}] = std::move(completion);
+  return true;
+}
+
+}  // namespace weft::worker

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/weft/v1/cluster.pb.h"
+
+namespace weft::worker {
+
+// A run of shards that the coordinator gave us, and how far we are. Shared between the table and
+// the threads that compute its shards: either may be done with it first. Guarded by the table's
+// owner, but for should_stop.
+struct Attempt {
+  v1::Assignment assignment;
+  std::uint64_t begun = 0;        // shards of the run that were claimed
+  std::uint64_t in_progress = 0;  // of those: neither delivered nor given up
+  std::vector<v1::ShardResult> results;
+  std::optional<v1::TaskError> error;
+  std::uint64_t prepare_ms = 0;
+  std::uint64_t work_ms = 0;
+  bool is_closing = false;  // no further shard is to be begun
+  bool is_revoked = false;  // the coordinator does not want it any more
+  std::atomic<bool> should_stop{false};
+};
+
+// One shard to compute.
+struct ShardClaim {
+  std::shared_ptr<Attempt> attempt;
+  std::uint64_t shard = 0;  // of the stage
+};
+
+// What this worker holds, runs and has to report: the worker's half of WorkerService.Synchronize.
+// No threads, no clock, no network; its owner brings a lock.
+class AttemptTable {
+ public:
+  explicit AttemptTable(unsigned threads) : threads_(threads) {}
+
+  // Writes `running`, `completions` and `free_attempts`.
+  void fill(v1::SynchronizeRequest& request) const;
+
+  // What an answer changed.
+  struct Changes {
+    std::vector<std::shared_ptr<Attempt>> assigned;
+    std::vector<std::shared_ptr<Attempt>> revoked;
+    std::uint64_t acknowledged = 0;
+  };
+  Changes apply(const v1::SynchronizeResponse& response);
+
+  // The next shard, of the attempt that came first; nothing when there is none.
+  [[nodiscard]] std::optional<ShardClaim> claim();
+
+  // The three ends of a claimed shard. Each says whether the attempt is over: it is then in the
+  // completions, or forgotten.
+  bool delivered(const ShardClaim& claim, v1::ShardResult result);
+  bool failed(const ShardClaim& claim, v1::TaskError error);
+  bool given_up(const ShardClaim& claim);
+
+  // Begins nothing more, asks running shards to stop, and takes no further attempts.
+  void drain();
+
+  [[nodiscard]] bool is_empty() const { return attempts_.empty() && completions_.empty(); }
+  [[nodiscard]] std::uint64_t unacknowledged() const { return completions_.size(); }
+
+ private:
+  using Name = std::pair<std::string, std::uint64_t>;  // job, attempt
+
+  void close(Attempt& attempt);
+  bool end_if_over(const std::shared_ptr<Attempt>& attempt);
+
+  unsigned threads_;
+  bool is_draining_ = false;
+  std::vector<std::shared_ptr<Attempt>> attempts_;  // in the order they came
+  std::map<Name, v1::Completion> completions_;
+};
+
+}  // namespace weft::worker

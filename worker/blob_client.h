@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <grpcpp/channel.h>
+
+#include "core/digest.h"
+#include "proto/weft/v1/cluster.grpc.pb.h"
+
+namespace weft::worker {
+
+// Moves blobs between this worker and the coordinator. While the coordinator is away a call waits
+// and tries again, until `should_stop` says so; it then throws core::Error(kCancelled). Any thread.
+class BlobClient {
+ public:
+  // The channel is shared with the other stubs of the process.
+  explicit BlobClient(const std::shared_ptr<grpc::Channel>& channel);
+
+  // The blob, checked against its digest. Goes on where a broken stream ended. Throws
+  // core::Error(kNotFound) when the coordinator has no such blob, kDataLoss when it is damaged.
+  [[nodiscard]] std::string read(const core::Digest& digest,
+                                 const std::function<bool()>& should_stop);
+
+  // Stores the blob with the coordinator. Throws core::Error(kResourceExhausted) when it is too
+  // large or the coordinator's disk is full.
+  void write(const core::Digest& digest, std::string_view data,
+             const std::function<bool()>& should_stop);
+
+ private:
+  std::unique_ptr<v1::BlobService::Stub> stub_;
+};
+
+}  // namespace weft::worker

@@ -1,0 +1,354 @@
+#include "worker/lease_loop.h"
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <optional>
+#include <random>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "core/error.h"
+#include "proto/limits.h"
+#include "proto/status.h"
+#include "worker/back_off.h"
+#include "worker/baker.h"
+
+namespace weft::worker {
+
+namespace {
+
+constexpr double kLeavingSeconds = 10;
+constexpr std::chrono::milliseconds kPoll{50};
+constexpr std::uint32_t kLongestWaitMs = 5000;
+constexpr std::uint32_t kShortestWaitMs = 200;
+constexpr std::uint32_t kAnswerAllowanceMs = 10'000;
+constexpr std::uint64_t kOutboxLimitBytes = std::uint64_t{512} << 20;
+
+std::string random_id() {
+  std::random_device device;
+  return fmt::format("{:08x}{:08x}", device(), device());
+}
+
+std::string log_name(const Attempt& attempt) {
+  const v1::Assignment& assignment = attempt.assignment;
+  return fmt::format("job={} attempt={} fabric={} stage={} first_shard={} shards={}",
+                     assignment.name().job_id(), assignment.name().attempt(), assignment.fabric(),
+                     assignment.stage(), assignment.first_shard(), assignment.shards());
+}
+
+// Whether the coordinator's answer means that this worker will never be taken.
+bool is_refusal(const grpc::Status& status) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::INVALID_ARGUMENT:
+    case grpc::StatusCode::FAILED_PRECONDITION:
+    case grpc::StatusCode::PERMISSION_DENIED:
+    case grpc::StatusCode::UNAUTHENTICATED:
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return true;
+    default:
+      return false;
+  }
+}
+
+std::uint64_t whole_ms(double seconds) { return static_cast<std::uint64_t>(seconds * 1000 + 0.5); }
+
+}  // namespace
+
+LeaseLoop::LeaseLoop(WorkerOptions options, const std::shared_ptr<grpc::Channel>& channel)
+    : options_(std::move(options)),
+      id_(random_id()),
+      fingerprint_(numerics_fingerprint()),
+      stub_(v1::WorkerService::NewStub(channel)),
+      blobs_(channel),
+      inputs_(options_.scratch, options_.scratch_limit_bytes, blobs_),
+      bakers_(inputs_),
+      outbox_(kOutboxLimitBytes),
+      table_(options_.threads) {}
+
+void LeaseLoop::run(const std::function<bool()>& should_leave) {
+  spdlog::info("worker={} name={} threads={} fingerprint={} scratch={} state=started", id_,
+               options_.name, options_.threads, fingerprint_.hex().substr(0, 12),
+               options_.scratch.string());
+  std::vector<std::jthread> threads;
+  threads.emplace_back([this] { synchronize(); });
+  threads.emplace_back([this] { upload(); });
+  for (unsigned i = 0; i < options_.threads; ++i) {
+    threads.emplace_back([this] { compute(); });
+  }
+  std::optional<core::Stopwatch> since_leaving;
+  std::unique_lock lock(mutex_);
+  while (!has_left_) {
+    changed_.wait_for(lock, kPoll);
+    lock.unlock();
+    if (!since_leaving && should_leave()) {
+      since_leaving.emplace();
+      begin_leaving();
+    }
+    if (since_leaving && since_leaving->seconds() > kLeavingSeconds) {
+      is_giving_up_.store(true);
+      tell_news();
+    }
+    lock.lock();
+  }
+  const std::uint64_t lost = table_.unacknowledged();
+  lock.unlock();
+  is_leaving_.store(true);
+  is_giving_up_.store(true);
+  tell_news();
+  outbox_.close();
+  threads.clear();
+  spdlog::info("worker={} unacknowledged={} state=ended", id_, lost);
+  if (failure_) {
+    std::rethrow_exception(failure_);
+  }
+}
+
+void LeaseLoop::begin_leaving() {
+  is_leaving_.store(true);
+  {
+    const std::lock_guard lock(mutex_);
+    table_.drain();
+  }
+  spdlog::info("worker={} state=leaving", id_);
+  tell_news();
+}
+
+// ---------------------------------------------------------------- exchange of states
+
+v1::SynchronizeRequest LeaseLoop::next_request(grpc::ClientContext& context) {
+  v1::SynchronizeRequest request;
+  request.set_request_id(fmt::format("{}-{}", id_, ++sequence_));
+  request.set_worker_id(id_);
+  request.set_sequence(sequence_);
+  request.set_name(options_.name);
+  request.set_threads(options_.threads);
+  request.set_memory_bytes(options_.memory_bytes);
+  request.set_fingerprint(fingerprint_.binary());
+  const bool is_leaving = is_leaving_.load();
+  request.set_leaving(is_leaving);
+  request.set_wait_ms(is_leaving ? 0 : wait_ms_);
+  const auto deadline_ms = static_cast<std::int64_t>(request.wait_ms()) + kAnswerAllowanceMs;
+  context.set_deadline(
+      gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_millis(deadline_ms, GPR_TIMESPAN)));
+  const std::lock_guard lock(mutex_);
+  table_.fill(request);
+  has_news_ = false;
+  waiting_call_ = &context;
+  return request;
+}
+
+void LeaseLoop::synchronize() {
+  BackOff back_off;
+  bool is_away = false;
+  while (!is_giving_up_.load()) {
+    grpc::ClientContext context;
+    const v1::SynchronizeRequest request = next_request(context);
+    v1::SynchronizeResponse response;
+    const grpc::Status status = stub_->Synchronize(&context, request, &response);
+    bool was_interrupted = false;
+    bool is_done = false;
+    {
+      const std::lock_guard lock(mutex_);
+      waiting_call_ = nullptr;
+      was_interrupted = has_news_;
+    }
+    if (status.ok()) {
+      back_off.reset();
+      if (is_away || sequence_ == 1) {
+        spdlog::info("worker={} coordinator=answers", id_);
+        is_away = false;
+      }
+      apply(response);
+      const std::lock_guard lock(mutex_);
+      is_done = is_leaving_.load() && request.leaving() && table_.is_empty();
+    } else if (is_refusal(status)) {
+      const std::lock_guard lock(mutex_);
+      failure_ = std::make_exception_ptr(
+          core::Error(core::Code::kFailedPrecondition,
+                      "the coordinator refuses this worker: " + status.error_message()));
+      is_done = true;
+    } else if (!was_interrupted && status.error_code() != grpc::StatusCode::ABORTED) {
+      if (!is_away) {
+        spdlog::warn("worker={} coordinator=away error=\"{}\"", id_, status.error_message());
+        is_away = true;
+      }
+      back_off.wait([this] { return is_giving_up_.load(); });
+    }
+    if (is_done) {
+      break;
+    }
+    if (status.ok() && response.next_poll_ms() > 0) {
+      pause(response.next_poll_ms());
+    } else if (is_leaving_.load()) {
+      pause(kPoll.count());
+    }
+  }
+  const std::lock_guard lock(mutex_);
+  has_left_ = true;
+  changed_.notify_all();
+}
+
+void LeaseLoop::pause(std::uint32_t for_ms) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, std::chrono::milliseconds(std::min(for_ms, kLongestWaitMs)),
+                    [this] { return has_news_; });
+}
+
+void LeaseLoop::apply(const v1::SynchronizeResponse& response) {
+  std::uint32_t shortest_lease_ms = 3 * kLongestWaitMs;
+  for (const v1::Lease& lease : response.leases()) {
+    shortest_lease_ms = std::min(shortest_lease_ms, lease.lease_ms());
+  }
+  for (const v1::Assignment& assignment : response.assignments()) {
+    shortest_lease_ms = std::min(shortest_lease_ms, assignment.lease_ms());
+  }
+  wait_ms_ = std::clamp(shortest_lease_ms / 3, kShortestWaitMs, kLongestWaitMs);
+  AttemptTable::Changes changes;
+  {
+    const std::lock_guard lock(mutex_);
+    changes = table_.apply(response);
+    changed_.notify_all();
+  }
+  for (const auto& attempt : changes.assigned) {
+    spdlog::info("worker={} {} state=assigned", id_, log_name(*attempt));
+  }
+  for (const auto& attempt : changes.revoked) {
+    spdlog::info("worker={} {} state=revoked", id_, log_name(*attempt));
+  }
+}
+
+void LeaseLoop::tell_news() {
+  const std::lock_guard lock(mutex_);
+  has_news_ = true;
+  if (waiting_call_ != nullptr) {
+    waiting_call_->TryCancel();
+  }
+  changed_.notify_all();
+}
+
+// ---------------------------------------------------------------- shards
+
+void LeaseLoop::compute() {
+  while (true) {
+    std::optional<ShardClaim> claim;
+    {
+      std::unique_lock lock(mutex_);
+      while (!is_leaving_.load() && !(claim = table_.claim())) {
+        changed_.wait(lock);
+      }
+    }
+    if (!claim) {
+      return;
+    }
+    bake(*claim);
+  }
+}
+
+void LeaseLoop::bake(const ShardClaim& claim) {
+  Attempt& attempt = *claim.attempt;
+  const v1::Assignment& assignment = attempt.assignment;
+  const auto should_stop = [&attempt, this] {
+    return attempt.should_stop.load() || is_giving_up_.load();
+  };
+  try {
+    const StageBakers::Prepared prepared = bakers_.of(assignment, should_stop);
+    std::string shard_input;
+    if (!assignment.shard_inputs().empty()) {
+      const auto index = static_cast<int>(claim.shard - assignment.first_shard());
+      shard_input =
+          blobs_.read(*core::Digest::from_binary(assignment.shard_inputs(index)), should_stop);
+    }
+    const core::Stopwatch since_start;
+    std::string result = prepared.baker->bake(claim.shard, shard_input, should_stop);
+    {
+      const std::lock_guard lock(mutex_);
+      attempt.prepare_ms += whole_ms(prepared.prepare_seconds);
+      attempt.work_ms += whole_ms(since_start.seconds());
+    }
+    const core::Digest digest = core::digest_of(result);
+    if (outbox_.push({claim, digest, std::move(result)})) {
+      return;
+    }
+  } catch (const core::Error& error) {
+    if (error.code() != core::Code::kCancelled) {
+      // Inputs that cannot be had are a shortage, not a fault of the task.
+      const bool is_short = error.code() == core::Code::kUnavailable ||
+                            error.code() == core::Code::kResourceExhausted ||
+                            error.code() == core::Code::kNotFound;
+      fail(claim, is_short ? v1::ERROR_KIND_RESOURCE_SHORT : v1::ERROR_KIND_TASK_FAILED,
+           error.what());
+      return;
+    }
+  } catch (const std::bad_alloc&) {
+    fail(claim, v1::ERROR_KIND_RESOURCE_SHORT, "out of memory");
+    return;
+  } catch (const std::exception& error) {
+    fail(claim, v1::ERROR_KIND_TASK_FAILED, error.what());
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  table_.given_up(claim);
+  changed_.notify_all();
+}
+
+void LeaseLoop::fail(const ShardClaim& claim, v1::ErrorKind kind, const std::string& message) {
+  spdlog::error("worker={} {} shard={} state=failed kind={} error=\"{}\"", id_,
+                log_name(*claim.attempt), claim.shard,
+                kind == v1::ERROR_KIND_RESOURCE_SHORT ? "resource_short" : "task_failed", message);
+  v1::TaskError error;
+  error.set_kind(kind);
+  error.set_shard(claim.shard);
+  error.set_message(message.substr(0, v1::kErrorTextLimitBytes));
+  bool is_over = false;
+  {
+    const std::lock_guard lock(mutex_);
+    is_over = table_.failed(claim, std::move(error));
+  }
+  if (is_over) {
+    tell_news();
+  }
+}
+
+// ---------------------------------------------------------------- results
+
+void LeaseLoop::upload() {
+  while (const std::optional<OutboxItem> item = outbox_.pop()) {
+    upload(*item);
+  }
+}
+
+void LeaseLoop::upload(const OutboxItem& item) {
+  try {
+    blobs_.write(item.digest, item.bytes, [this] { return is_giving_up_.load(); });
+  } catch (const core::Error& error) {
+    if (error.code() == core::Code::kCancelled) {
+      const std::lock_guard lock(mutex_);
+      table_.given_up(item.claim);
+    } else {
+      fail(item.claim, v1::ERROR_KIND_RESOURCE_SHORT, error.what());
+    }
+    return;
+  }
+  v1::ShardResult result;
+  result.set_shard(item.claim.shard);
+  result.set_digest(item.digest.binary());
+  result.set_size_bytes(item.bytes.size());
+  bool is_over = false;
+  {
+    const std::lock_guard lock(mutex_);
+    is_over = table_.delivered(item.claim, std::move(result));
+  }
+  if (is_over) {
+    const Attempt& attempt = *item.claim.attempt;
+    spdlog::info("worker={} {} results={} prepare_ms={} work_ms={} state=completed", id_,
+                 log_name(attempt), attempt.results.size(), attempt.prepare_ms, attempt.work_ms);
+    tell_news();
+  }
+}
+
+}  // namespace weft::worker

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+
+#include "core/digest.h"
+#include "proto/weft/v1/cluster.pb.h"
+#include "worker/baker.h"
+#include "worker/input_cache.h"
+
+namespace weft::worker {
+
+// Bakers of the stages that this worker computed last, so that inputs are decoded and scenes built
+// once per stage, not once per shard. Any thread; threads that want the same stage wait for the one
+// that prepares it, others do not.
+class StageBakers {
+ public:
+  explicit StageBakers(InputCache& inputs) : inputs_(inputs) {}
+
+  struct Prepared {
+    std::shared_ptr<const Baker> baker;  // shared: the cache may drop it while shards still run
+    double prepare_seconds = 0;          // 0 when it was there already
+  };
+  // Throws what reading the inputs and make_baker throw; the next call tries again.
+  [[nodiscard]] Prepared of(const v1::Assignment& assignment,
+                            const std::function<bool()>& should_stop);
+
+ private:
+  struct Slot {
+    core::Digest stage;
+    std::mutex mutex;
+    std::shared_ptr<const Baker> baker;
+  };
+
+  [[nodiscard]] std::shared_ptr<Slot> slot_of(const core::Digest& stage);
+
+  InputCache& inputs_;
+  std::mutex mutex_;
+  std::list<std::shared_ptr<Slot>> slots_;  // the one used last first
+};
+
+}  // namespace weft::worker
