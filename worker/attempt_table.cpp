@@ -36,12 +36,10 @@ bool has_name(const Attempt& attempt, const v1::AttemptName& name) {
 }  // namespace
 
 void AttemptTable::fill(v1::SynchronizeRequest& request) const {
-  std::uint64_t held = 0;
   for (const auto& attempt : attempts_) {
     if (attempt->is_revoked) {
       continue;
     }
-    ++held;
     v1::RunningAttempt& running = *request.add_running();
     running.set_job_id(attempt->assignment.name().job_id());
     running.set_attempt(attempt->assignment.name().attempt());
@@ -54,12 +52,23 @@ void AttemptTable::fill(v1::SynchronizeRequest& request) const {
     }
     *request.add_completions() = completion;
   }
-  const std::uint64_t wanted = std::uint64_t{threads_} + 1;
-  const bool takes_more = !is_draining_ && held < wanted &&
-                          completions_.size() < static_cast<std::size_t>(v1::kCompletionLimit) / 2;
-  request.set_free_attempts(takes_more ? static_cast<std::uint32_t>(std::min<std::uint64_t>(
-                                             wanted - held, v1::kFreeAttemptsLimit))
-                                       : 0);
+  request.set_free_attempts(free_attempts());
+}
+
+std::uint32_t AttemptTable::free_attempts() const {
+  constexpr std::uint64_t kWantedAhead = 2;
+  std::uint64_t held = 0;
+  std::uint64_t ahead = 0;  // with shards that are not begun
+  for (const auto& attempt : attempts_) {
+    held += attempt->is_revoked ? 0 : 1;
+    ahead += !attempt->is_closing && attempt->begun < attempt->assignment.shards() ? 1 : 0;
+  }
+  const std::uint64_t limit = std::min<std::uint64_t>(threads_ + 1, v1::kFreeAttemptsLimit);
+  if (is_draining_ || held >= limit || ahead >= kWantedAhead ||
+      completions_.size() >= static_cast<std::size_t>(v1::kCompletionLimit) / 2) {
+    return 0;
+  }
+  return static_cast<std::uint32_t>(std::min(limit - held, kWantedAhead - ahead));
 }
 
 AttemptTable::Changes AttemptTable::apply(const v1::SynchronizeResponse& response) {

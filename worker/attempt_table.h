@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/clock.h"
 #include "proto/weft/v1/cluster.pb.h"
 
 namespace weft::worker {
@@ -22,10 +23,11 @@ struct Attempt {
   std::uint64_t in_progress = 0;  // of those: neither delivered nor given up
   std::vector<v1::ShardResult> results;
   std::optional<v1::TaskError> error;
+  std::optional<core::Stopwatch> since_first_shard;
   std::uint64_t prepare_ms = 0;
-  std::uint64_t work_ms = 0;
-  bool is_closing = false;  // no further shard is to be begun
-  bool is_revoked = false;  // the coordinator does not want it any more
+  std::uint64_t work_ms = 0;  // wall time from the first shard to the last, preparing aside
+  bool is_closing = false;    // no further shard is to be begun
+  bool is_revoked = false;    // the coordinator does not want it any more
   std::atomic<bool> should_stop{false};
 };
 
@@ -41,7 +43,8 @@ class AttemptTable {
  public:
   explicit AttemptTable(unsigned threads) : threads_(threads) {}
 
-  // Writes `running`, `completions` and `free_attempts`.
+  // Writes `running`, `completions` and `free_attempts`. A run is sized for all threads, so one
+  // that is begun and one to go on with are enough; runs of few shards leave room for more.
   void fill(v1::SynchronizeRequest& request) const;
 
   // What an answer changed.
@@ -64,6 +67,8 @@ class AttemptTable {
   // Begins nothing more, asks running shards to stop, and takes no further attempts.
   void drain();
 
+  // How many further attempts it would take now.
+  [[nodiscard]] std::uint32_t free_attempts() const;
   [[nodiscard]] bool is_empty() const { return attempts_.empty() && completions_.empty(); }
   [[nodiscard]] std::uint64_t unacknowledged() const { return completions_.size(); }
 

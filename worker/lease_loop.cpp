@@ -137,6 +137,7 @@ v1::SynchronizeRequest LeaseLoop::next_request(grpc::ClientContext& context) {
       gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_millis(deadline_ms, GPR_TIMESPAN)));
   const std::lock_guard lock(mutex_);
   table_.fill(request);
+  free_told_ = request.free_attempts();
   has_news_ = false;
   waiting_call_ = &context;
   return request;
@@ -236,14 +237,22 @@ void LeaseLoop::tell_news() {
 void LeaseLoop::compute() {
   while (true) {
     std::optional<ShardClaim> claim;
+    bool has_room = false;
     {
       std::unique_lock lock(mutex_);
       while (!is_leaving_.load() && !(claim = table_.claim())) {
         changed_.wait(lock);
       }
+      if (!claim) {
+        return;
+      }
+      if (!claim->attempt->since_first_shard) {
+        claim->attempt->since_first_shard.emplace();
+      }
+      has_room = table_.free_attempts() > free_told_;
     }
-    if (!claim) {
-      return;
+    if (has_room) {
+      tell_news();
     }
     bake(*claim);
   }
@@ -263,12 +272,12 @@ void LeaseLoop::bake(const ShardClaim& claim) {
       shard_input =
           blobs_.read(*core::Digest::from_binary(assignment.shard_inputs(index)), should_stop);
     }
-    const core::Stopwatch since_start;
     std::string result = prepared.baker->bake(claim.shard, shard_input, should_stop);
     {
       const std::lock_guard lock(mutex_);
       attempt.prepare_ms += whole_ms(prepared.prepare_seconds);
-      attempt.work_ms += whole_ms(since_start.seconds());
+      const std::uint64_t wall_ms = whole_ms(attempt.since_first_shard->seconds());
+      attempt.work_ms = wall_ms - std::min(wall_ms, attempt.prepare_ms);
     }
     const core::Digest digest = core::digest_of(result);
     if (outbox_.push({claim, digest, std::move(result)})) {

@@ -71,11 +71,12 @@ class LeaseLoop {
   std::condition_variable changed_;
   AttemptTable table_;                           // guarded by mutex_
   grpc::ClientContext* waiting_call_ = nullptr;  // guarded by mutex_
-  bool has_news_ = false;                        // guarded by mutex_
-  bool has_left_ = false;                        // guarded by mutex_
-  std::exception_ptr failure_;                   // guarded by mutex_
-  std::uint32_t wait_ms_ = 1000;                 // of the synchronizing thread alone
-  std::uint64_t sequence_ = 0;                   // of the synchronizing thread alone
+  std::uint32_t free_told_ = 0;   // guarded by mutex_: free_attempts of the last request
+  bool has_news_ = false;         // guarded by mutex_
+  bool has_left_ = false;         // guarded by mutex_
+  std::exception_ptr failure_;    // guarded by mutex_
+  std::uint32_t wait_ms_ = 1000;  // of the synchronizing thread alone
+  std::uint64_t sequence_ = 0;    // of the synchronizing thread alone
   std::atomic<bool> is_leaving_{false};
   std::atomic<bool> is_giving_up_{false};  // leaving took too long, or the coordinator refused us
 };
