@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <utility>
 
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
@@ -29,42 +30,21 @@ std::string json_of(const google::protobuf::Message& message) {
   return json;
 }
 
-// Plans the job again, stage by stage, and takes each stage's results as it comes up: what is
-// merged is what the plan says, or an error.
-std::vector<FinishedStage> match_plan(const v1::FabricDescription& description,
-                                      const std::vector<StageResults>& results,
-                                      const ReadBlob& read_blob) {
-  std::vector<FinishedStage> matched;
-  std::vector<StageResults> finished;
-  for (std::vector<Stage> stages = plan(description, finished, read_blob); !stages.empty();
-       stages = plan(description, finished, read_blob)) {
-    for (Stage& stage : stages) {
-      const auto found =
-          std::find_if(results.begin(), results.end(),
-                       [&stage](const StageResults& r) { return r.name == stage.name; });
-      const std::string name = std::string("stage ") + to_string(stage.name);
-      if (found == results.end()) {
-        throw core::Error(core::Code::kFailedPrecondition,
-                          name + " has no results yet; commit when all stages are finished");
-      }
-      if (found->shards.size() != stage.shard_count) {
-        throw core::Error(core::Code::kDataLoss,
-                          name + " has " + std::to_string(found->shards.size()) +
-                              " results where " + std::to_string(stage.shard_count) +
-                              " were planned; run the job again");
-      }
-      finished.push_back(*found);
-      matched.push_back({std::move(stage), found->shards});
-    }
+// The results of a planned stage: one for each shard of the plan, or an error.
+FinishedStage take_results(Stage stage, const std::vector<StageResults>& results) {
+  const auto found = std::find_if(results.begin(), results.end(),
+                                  [&stage](const StageResults& r) { return r.name == stage.name; });
+  const std::string name = std::string("stage ") + to_string(stage.name);
+  if (found == results.end()) {
+    throw core::Error(core::Code::kFailedPrecondition,
+                      name + " has no results yet; commit when all stages are finished");
   }
-  return matched;
-}
-
-const FinishedStage& stage_named(const std::vector<FinishedStage>& stages, StageName name) {
-  const auto found = std::find_if(stages.begin(), stages.end(),
-                                  [name](const FinishedStage& s) { return s.stage.name == name; });
-  CHECK(found != stages.end());
-  return *found;
+  if (found->shards.size() != stage.shard_count) {
+    throw core::Error(core::Code::kDataLoss,
+                      name + " has " + std::to_string(found->shards.size()) + " results where " +
+                          std::to_string(stage.shard_count) + " were planned; run the job again");
+  }
+  return {std::move(stage), found->shards};
 }
 
 shading::FibreMaterial fibre_material(const v1::Material& material) {
@@ -74,6 +54,31 @@ shading::FibreMaterial fibre_material(const v1::Material& material) {
   };
   return {colour(material.c_r()), colour(material.c_tt()), radians(material.beta_r_deg()),
           radians(material.beta_tt_deg()), radians(material.gamma_tt_deg())};
+}
+
+// Folds a stage into `database`. Stages come in an order in which they can be planned, so those
+// that this one needs are folded.
+void fold(const FinishedStage& finished, const v1::FabricDescription& description,
+          const ReadBlob& read_blob, storage::FabricDatabase& database) {
+  switch (finished.stage.name) {
+    case StageName::kGeometry:
+      return fold_geometry(finished, read_blob, database);
+    case StageName::kGrid:
+      return fold_grid(finished, read_blob, database);
+    case StageName::kVisibility:
+      return;  // the coefficients hold what the file needs of it
+    case StageName::kBasis:
+      return fold_basis(finished, read_blob, database);
+    case StageName::kCoefficients:
+      return fold_coefficients(finished, basis_sample(description, finished.shards.size()),
+                               read_blob, database);
+    case StageName::kTransfer:
+      for (const v1::Material& material : finished.stage.spec.transfer().materials()) {
+        database.materials.push_back(fibre_material(material));
+      }
+      return fold_transfer(finished, read_blob, database);
+  }
+  core::check_failed(__FILE__, __LINE__, "unknown stage");
 }
 
 // One digest for all results of a stage.
@@ -87,13 +92,17 @@ core::Digest digest_of_results(const FinishedStage& finished) {
 
 std::string stages_json(const std::vector<FinishedStage>& stages) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const FinishedStage& finished : stages) {
+  for (const StageName name : all_stages()) {
+    const auto found = std::find_if(stages.begin(), stages.end(), [name](const FinishedStage& s) {
+      return s.stage.name == name;
+    });
+    CHECK(found != stages.end());
     nlohmann::ordered_json entry;
-    entry["name"] = to_string(finished.stage.name);
-    entry["shards"] = finished.shards.size();
-    entry["results_sha256"] = digest_of_results(finished).hex();
-    if (!finished.stage.spec.has_geometry()) {  // that one is the description itself
-      entry["spec"] = nlohmann::ordered_json::parse(json_of(finished.stage.spec));
+    entry["name"] = to_string(name);
+    entry["shards"] = found->shards.size();
+    entry["results_sha256"] = digest_of_results(*found).hex();
+    if (name != StageName::kGeometry) {  // that one's is the description itself
+      entry["spec"] = nlohmann::ordered_json::parse(json_of(found->stage.spec));
     }
     list.push_back(entry);
   }
@@ -106,21 +115,17 @@ core::Digest commit(const v1::FabricDescription& description,
                     const std::vector<StageResults>& results,
                     const std::function<std::string(const core::Digest&)>& read_blob,
                     const std::filesystem::path& path) {
-  const std::vector<FinishedStage> stages = match_plan(description, results, read_blob);
-  const FinishedStage& geometry = stage_named(stages, StageName::kGeometry);
-  const FinishedStage& coefficients = stage_named(stages, StageName::kCoefficients);
-  const FinishedStage& transfer = stage_named(stages, StageName::kTransfer);
-
+  // The job is planned again, stage by stage: what is merged is what the plan says.
   storage::FabricDatabase database;
-  fold_tile(fabric::decode_tile(read_blob(geometry.shards.front())), database);
-  fold_grid(stage_named(stages, StageName::kGrid), read_blob, database);
-  fold_basis(stage_named(stages, StageName::kBasis), read_blob, database);
-  fold_coefficients(coefficients, basis_sample(description, coefficients.shards.size()), read_blob,
-                    database);
-  fold_transfer(transfer, read_blob, database);
-
-  for (const v1::Material& material : transfer.stage.spec.transfer().materials()) {
-    database.materials.push_back(fibre_material(material));
+  std::vector<FinishedStage> stages;
+  std::vector<StageResults> finished;
+  for (std::vector<Stage> planned = plan(description, finished, read_blob); !planned.empty();
+       planned = plan(description, finished, read_blob)) {
+    for (Stage& stage : planned) {
+      stages.push_back(take_results(std::move(stage), results));
+      fold(stages.back(), description, read_blob, database);
+      finished.push_back({stages.back().stage.name, stages.back().shards});
+    }
   }
   database.c_s = storage::scattering_tables(database.materials, database.sh_order);
   database.sigma_shadow_mm = kShadowSigmaMfp * database.mean_free_path_mm;

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/moments.h"
+#include "fabric/tile.h"
 #include "proto/arrays.h"
 
 namespace weft::coordinator {
@@ -15,6 +16,21 @@ namespace {
 // Sums over all shards of a cell: no number of paths overflows it.
 __extension__ typedef __int128 WideSum;
 
+[[noreturn]] void refuse_result(const std::string& name, const std::string& what) {
+  throw core::Error(core::Code::kDataLoss, name + ": the result is malformed: " + what +
+                                               "; delete it and compute it again");
+}
+
+// The envelope's own errors know neither stage nor shard: `name` says them.
+template <class Function>
+std::invoke_result_t<Function> naming(const std::string& name, Function function) {
+  try {
+    return function();
+  } catch (const core::Error& error) {
+    refuse_result(name, error.what());
+  }
+}
+
 // The result of one shard, read array by array.
 class ShardResult {
  public:
@@ -22,7 +38,7 @@ class ShardResult {
       : name_(std::string("stage ") + to_string(finished.stage.name) + ", shard " +
               std::to_string(shard)) {
     const std::string bytes = read_blob(finished.shards[shard]);
-    arrays_ = naming([&] { return v1::parse_arrays(bytes); });
+    arrays_ = naming(name_, [&] { return v1::parse_arrays(bytes); });
   }
 
   // Array `name`, which must have this shape.
@@ -30,7 +46,7 @@ class ShardResult {
   [[nodiscard]] std::vector<T> array(const char* name,
                                      const std::vector<std::uint64_t>& expected) const {
     std::vector<std::uint64_t> shape;
-    std::vector<T> data = naming([&] { return v1::array_of<T>(arrays_, name, &shape); });
+    std::vector<T> data = naming(name_, [&] { return v1::array_of<T>(arrays_, name, &shape); });
     if (shape != expected) {
       refuse(std::string("array '") + name + "' has shape " + text_of(shape) + " where " +
              text_of(expected) + " was planned");
@@ -42,14 +58,11 @@ class ShardResult {
   template <class T>
   [[nodiscard]] std::vector<std::uint64_t> shape_of(const char* name) const {
     std::vector<std::uint64_t> shape;
-    naming([&] { return v1::array_of<T>(arrays_, name, &shape); });
+    naming(name_, [&] { return v1::array_of<T>(arrays_, name, &shape); });
     return shape;
   }
 
-  [[noreturn]] void refuse(const std::string& what) const {
-    throw core::Error(core::Code::kDataLoss, name_ + ": the result is malformed: " + what +
-                                                 "; delete it and compute it again");
-  }
+  [[noreturn]] void refuse(const std::string& what) const { refuse_result(name_, what); }
 
   void require(bool holds, const char* what) const {
     if (!holds) {
@@ -64,16 +77,6 @@ class ShardResult {
       text += (text.size() > 1 ? ", " : "") + std::to_string(extent);
     }
     return text + "]";
-  }
-
-  // The envelope's own errors know neither stage nor shard; they are named here, where both are.
-  template <class Function>
-  std::invoke_result_t<Function> naming(Function function) const {
-    try {
-      return function();
-    } catch (const core::Error& error) {
-      refuse(error.what());
-    }
   }
 
   std::string name_;
@@ -135,7 +138,11 @@ void add_shard(const FinishedStage& transfer, std::uint64_t shard, const ReadBlo
 
 }  // namespace
 
-void fold_tile(const fabric::Tile& tile, storage::FabricDatabase& database) {
+void fold_geometry(const FinishedStage& geometry, const ReadBlob& read_blob,
+                   storage::FabricDatabase& database) {
+  const std::string bytes = read_blob(geometry.shards.front());
+  const fabric::Tile tile =
+      naming("stage geometry, shard 0", [&bytes] { return fabric::decode_tile(bytes); });
   database.size_mm = tile.size_mm;
   database.z_bounds_mm = {tile.z_min_mm, tile.z_max_mm};
   database.blocks = tile.blocks;

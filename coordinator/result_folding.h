@@ -6,7 +6,6 @@
 
 #include "coordinator/plan.h"
 #include "core/digest.h"
-#include "fabric/tile.h"
 #include "storage/fabric_database.h"
 
 namespace weft::coordinator {
@@ -23,14 +22,16 @@ using ReadBlob = std::function<std::string(const core::Digest&)>;
 // throw core::Error(kDataLoss) naming stage and shard when a result is malformed: missing arrays,
 // shapes other than the plan's, numbers that cannot be.
 
-void fold_tile(const fabric::Tile& tile, storage::FabricDatabase& database);
+void fold_geometry(const FinishedStage& geometry, const ReadBlob& read_blob,
+                   storage::FabricDatabase& database);
+// REQUIRES: the geometry is folded.
 void fold_grid(const FinishedStage& grid, const ReadBlob& read_blob,
                storage::FabricDatabase& database);
 void fold_basis(const FinishedStage& basis, const ReadBlob& read_blob,
                 storage::FabricDatabase& database);
-// REQUIRES: the tile, the grid and the basis are folded. `basis_shards`, ascending, are those that
-// the basis was made from: the sign error is taken from the others, or from all where there are no
-// others.
+// REQUIRES: the geometry, the grid and the basis are folded. `basis_shards`, ascending, are those
+// that the basis was made from: the sign error is taken from the others, or from all where there
+// are no others.
 void fold_coefficients(const FinishedStage& coefficients,
                        const std::vector<std::uint64_t>& basis_shards, const ReadBlob& read_blob,
                        storage::FabricDatabase& database);

@@ -1,0 +1,440 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+
+#include "coordinator/commit.h"
+#include "coordinator/result_folding.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/half.h"
+#include "core/moments.h"
+#include "core/random.h"
+#include "fabric/tile.h"
+#include "proto/arrays.h"
+#include "storage/fabric_database.h"
+
+namespace weft::coordinator {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::uint32_t kResolution = 8;
+constexpr std::uint32_t kComponents = 4;
+constexpr std::uint32_t kSgCount = 3;
+constexpr std::uint32_t kOrder = 1;
+constexpr std::uint64_t kEntries = 4;  // (order + 1)^2
+constexpr std::uint32_t kPathsPerCell = 40'000;
+constexpr std::uint32_t kCells = 2;
+
+template <class T>
+void add(v1::Arrays& arrays, const char* name, std::vector<std::uint64_t> shape,
+         const std::vector<T>& data) {
+  v1::add_array<T>(arrays, name, std::move(shape), std::span<const T>(data));
+}
+
+v1::FabricDescription description() {
+  v1::FabricDescription d;
+  d.set_name("synthetic");
+  d.set_seed(7);
+  v1::Material& silk = *d.add_materials();
+  silk.set_name("silk");
+  silk.mutable_c_r()->set_g(0.25);
+  silk.mutable_c_tt()->set_b(0.5);
+  silk.set_beta_r_deg(10);
+  silk.set_beta_tt_deg(20);
+  silk.set_gamma_tt_deg(30);
+  v1::Precompute& p = *d.mutable_precompute();
+  p.set_quality(v1::QUALITY_PREVIEW);
+  p.set_sh_order(kOrder);
+  p.set_cell_length_mfp(1);
+  p.set_paths_per_cell(kPathsPerCell);
+  p.set_transfer_estimator(v1::TRANSFER_ESTIMATOR_EXIT);
+  p.set_visibility_resolution(kResolution);
+  p.set_pca_components(kComponents);
+  p.set_pca_sample_segments(64);
+  p.set_sg_count(kSgCount);
+  p.set_sg_sharpness(128);
+  p.set_max_path_length(100);
+  return d;
+}
+
+// Two strands of 100 and 50 segments: three shards of visibility.
+fabric::Tile tile() {
+  fabric::Tile t;
+  t.size_mm = {1, 1};
+  t.z_min_mm = -0.1F;
+  t.z_max_mm = 0.1F;
+  t.material_names = {"silk"};
+  t.yarn_names = {"yarn"};
+  t.threads = {{0, fabric::Role::kWarp, 0}};
+  t.strands = {{0, 101, 0, 0, 0.01F, 0, 0}, {101, 51, 0, 0, 0.01F, 0, 0}};
+  for (int i = 0; i < 152; ++i) {
+    t.points_mm.emplace_back(0.01F * static_cast<float>(i), 0.0F, 0.0F);
+  }
+  fabric::index_segments(t);
+  return t;
+}
+
+// Numbers that tell which result and which element they are.
+std::uint16_t half_at(std::uint64_t segment, std::uint64_t i) {
+  return core::half_from_float(static_cast<float>(segment % 128) / 128.0F +
+                               static_cast<float>(i) / 1024.0F);
+}
+
+std::vector<float> ramp(std::uint64_t count, float step) {
+  std::vector<float> values(count);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    values[i] = step * static_cast<float>(i);
+  }
+  return values;
+}
+
+v1::Arrays grid_result() {
+  v1::Arrays arrays;
+  add<float>(arrays, "mean_free_path_mm", {1}, {0.125F});
+  add<std::uint32_t>(arrays, "cells_per_axis", {3}, {2, 1, 1});
+  std::vector<std::uint32_t> cell_of_segment(150);
+  std::fill(cell_of_segment.begin() + 70, cell_of_segment.end(), 1);
+  add(arrays, "cell_of_segment", {150}, cell_of_segment);
+  add<std::uint32_t>(arrays, "cell_coordinates", {2, 3}, {0, 0, 0, 1, 0, 0});
+  return arrays;
+}
+
+v1::Arrays coefficients_result(std::uint64_t shard, std::uint64_t shards) {
+  std::vector<v1::Half> ssdf;
+  std::vector<v1::Half> ssg;
+  std::vector<v1::Half> open;
+  std::vector<std::uint32_t> rotation;
+  for (std::uint64_t segment = shard; segment < 150; segment += shards) {
+    for (std::uint64_t i = 0; i < kComponents; ++i) {
+      ssdf.push_back({half_at(segment, i)});
+    }
+    for (std::uint64_t i = 0; i < kSgCount; ++i) {
+      ssg.push_back({half_at(segment, i + 10)});
+    }
+    open.push_back({core::half_from_float(static_cast<float>(segment) / 256.0F)});
+    rotation.push_back(static_cast<std::uint32_t>(segment * 400));
+  }
+  v1::Arrays arrays;
+  const std::uint64_t n = open.size();
+  add(arrays, "ssdf", {n, kComponents}, ssdf);
+  add(arrays, "ssg", {n, kSgCount}, ssg);
+  add(arrays, "open_share", {n}, open);
+  add(arrays, "rotation", {n}, rotation);
+  const auto index = static_cast<std::uint32_t>(shard);
+  add<std::uint32_t>(arrays, "sign_errors", {2}, {1 + index, 100});
+  return arrays;
+}
+
+// One sample of a path's contribution to matrix entry i.
+double sample(std::uint64_t cell, std::uint64_t path, std::uint64_t i) {
+  core::Random random(99, static_cast<std::uint32_t>(cell), path * 64 + i);
+  return 0.5 + static_cast<double>(i) + 0.1 * random.uniform_double();
+}
+
+v1::Arrays transfer_result(std::uint64_t cell, std::uint64_t first, std::uint64_t count) {
+  std::vector<std::int64_t> sum(3 * kEntries * kEntries);
+  std::vector<std::int64_t> squares(sum.size());
+  for (std::uint64_t path = first; path < first + count; path += 100) {  // 1 in 100 contributes
+    for (std::uint64_t i = 0; i < sum.size(); ++i) {
+      const double x = sample(cell, path, i);
+      sum[i] += core::to_fixed_point(x);
+      squares[i] += core::to_fixed_point(x * x);
+    }
+  }
+  v1::Arrays arrays;
+  add<std::uint64_t>(arrays, "paths", {1}, {count});
+  add(arrays, "sum", {3, kEntries, kEntries}, sum);
+  add(arrays, "sum_of_squares", {3, kEntries, kEntries}, squares);
+  return arrays;
+}
+
+v1::Arrays result_of(const Stage& stage, std::uint64_t shard) {
+  v1::Arrays arrays;
+  switch (stage.name) {
+    case StageName::kGeometry:
+      return v1::parse_arrays(fabric::encode_tile(tile()));
+    case StageName::kGrid:
+      return grid_result();
+    case StageName::kVisibility:
+      add<std::uint8_t>(arrays, "bits", {1, 1}, {static_cast<std::uint8_t>(shard)});
+      return arrays;
+    case StageName::kBasis:
+      add(arrays, "mean", {64}, ramp(64, 0.01F));
+      add(arrays, "components", {kComponents, 64}, ramp(kComponents * std::uint64_t{64}, -0.01F));
+      add(arrays, "variance", {kComponents}, ramp(kComponents, 1));
+      return arrays;
+    case StageName::kCoefficients:
+      return coefficients_result(shard, stage.shard_count);
+    case StageName::kTransfer: {
+      const std::uint64_t blocks = stage.shard_count / kCells;
+      const std::uint64_t first = shard % blocks * stage.spec.transfer().paths_per_shard();
+      const std::uint64_t count =
+          std::min<std::uint64_t>(stage.spec.transfer().paths_per_shard(), kPathsPerCell - first);
+      return transfer_result(shard / blocks, first, count);
+    }
+  }
+  return arrays;
+}
+
+// A job's results as they pile up: blobs by digest, shards by index.
+class Results {
+ public:
+  [[nodiscard]] std::string read(const core::Digest& digest) const {
+    const auto found = blobs_.find(digest);
+    if (found == blobs_.end()) {
+      throw core::Error(core::Code::kNotFound, "no blob " + digest.hex());
+    }
+    return found->second;
+  }
+  [[nodiscard]] ReadBlob reader() const {
+    return [this](const core::Digest& digest) { return read(digest); };
+  }
+
+  void put(StageName stage, std::uint64_t shard, std::uint64_t shards, const std::string& bytes) {
+    const core::Digest digest = core::digest_of(bytes);
+    blobs_[digest] = bytes;
+    StageResults& results = of(stage);
+    results.shards.resize(shards);
+    results.shards[shard] = digest;
+  }
+
+  StageResults& of(StageName stage) {
+    const auto found = std::find_if(stages.begin(), stages.end(),
+                                    [stage](const StageResults& r) { return r.name == stage; });
+    if (found != stages.end()) {
+      return *found;
+    }
+    stages.push_back({stage, {}});
+    return stages.back();
+  }
+
+  // Runs the whole job; the shards of each stage arrive in an order that `order` chooses.
+  void run_job(std::uint64_t order) {
+    for (std::vector<Stage> planned = plan(description(), stages, reader()); !planned.empty();
+         planned = plan(description(), stages, reader())) {
+      if (order % 2 == 1) {
+        std::reverse(planned.begin(), planned.end());
+      }
+      for (const Stage& stage : planned) {
+        std::vector<std::uint64_t> shards(stage.shard_count);
+        std::iota(shards.begin(), shards.end(), std::uint64_t{0});
+        core::Random random(order, 0);
+        for (std::size_t i = shards.size(); i > 1; --i) {
+          std::swap(shards[i - 1], shards[random.below(static_cast<std::uint32_t>(i))]);
+        }
+        for (const std::uint64_t shard : shards) {
+          put(stage.name, shard, stage.shard_count, v1::serialize(result_of(stage, shard)));
+        }
+      }
+    }
+    if (order % 2 == 1) {
+      std::reverse(stages.begin(), stages.end());
+    }
+  }
+
+  std::vector<StageResults> stages;
+
+ private:
+  std::map<core::Digest, std::string> blobs_;
+};
+
+class CommitTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  // The message with which a job is refused whose shard has been replaced by `bytes`.
+  std::string refusal(StageName stage, std::uint64_t shard, const std::string& bytes) const {
+    Results results;
+    results.run_job(0);
+    results.put(stage, shard, results.of(stage).shards.size(), bytes);
+    return refusal(results);
+  }
+  std::string refusal(StageName stage, std::uint64_t shard, const v1::Arrays& arrays) const {
+    return refusal(stage, shard, v1::serialize(arrays));
+  }
+  std::string refusal(const Results& results) const {
+    try {
+      commit(description(), results.stages, results.reader(), path_);
+    } catch (const core::Error& error) {
+      EXPECT_FALSE(std::filesystem::exists(path_));
+      return error.what();
+    }
+    ADD_FAILURE() << "no error";
+    return "";
+  }
+
+  std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) /
+      (std::string("weft_commit_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  std::filesystem::path path_ = folder_ / "fabric.h5";
+};
+
+TEST_F(CommitTest, Merge_IsIndependentOfArrivalOrder) {
+  Results first;
+  first.run_job(0);
+  const core::Digest digest = commit(description(), first.stages, first.reader(), path_);
+  const std::string bytes = core::read_file(path_);
+  for (std::uint64_t order = 1; order <= 4; ++order) {
+    Results other;
+    other.run_job(order);
+    EXPECT_EQ(commit(description(), other.stages, other.reader(), path_), digest) << order;
+    EXPECT_EQ(core::read_file(path_), bytes) << order;
+  }
+}
+
+TEST_F(CommitTest, Merge_PutsEverySegmentInItsPlace) {
+  Results results;
+  results.run_job(3);
+  commit(description(), results.stages, results.reader(), path_);
+  const storage::FabricDatabase db = storage::read_database(path_);
+  ASSERT_EQ(db.cell_of_segment.size(), 150U);
+  for (std::uint64_t segment = 0; segment < 150; ++segment) {
+    for (std::uint64_t i = 0; i < kComponents; ++i) {
+      EXPECT_EQ(db.ssdf[segment * kComponents + i], half_at(segment, i));
+    }
+    for (std::uint64_t i = 0; i < kSgCount; ++i) {
+      EXPECT_EQ(db.ssg[segment * kSgCount + i], half_at(segment, i + 10));
+    }
+    EXPECT_EQ(db.ssg_rotation[segment], segment * 400);
+    EXPECT_EQ(core::float_from_half(db.open_share[segment]), static_cast<float>(segment) / 256.0F);
+  }
+  EXPECT_EQ(db.ssdf_mean, ramp(64, 0.01F));
+  EXPECT_EQ(db.points_mm.size(), 3U * 152);
+  EXPECT_EQ(db.strands, (std::vector<std::uint32_t>{101, 0, 0, 51, 0, 0}));
+}
+
+TEST_F(CommitTest, Merge_TakesTheSignErrorFromHeldOutShards) {
+  Results results;
+  results.run_job(0);
+  commit(description(), results.stages, results.reader(), path_);
+  const std::vector<std::uint64_t> sampled = basis_sample(description(), 3);
+  ASSERT_EQ(sampled.size(), 1U);
+  const double wrong = 1 + 2 + 3 - (1 + static_cast<double>(sampled[0]));
+  EXPECT_DOUBLE_EQ(storage::read_database(path_).ssdf_sign_error, wrong / 200);
+}
+
+TEST_F(CommitTest, Merge_GivesMeanAndStandardErrorOfAllPaths) {
+  Results results;
+  results.run_job(0);
+  commit(description(), results.stages, results.reader(), path_);
+  const storage::FabricDatabase db = storage::read_database(path_);
+  EXPECT_EQ(db.cell_paths, (std::vector<std::uint64_t>{kPathsPerCell, kPathsPerCell}));
+  const std::uint64_t matrix = 3 * kEntries * kEntries;
+  for (std::uint64_t cell = 0; cell < kCells; ++cell) {
+    for (std::uint64_t i = 0; i < matrix; i += 7) {
+      double sum = 0;
+      double squares = 0;
+      // Blocks of 16,384 paths; one path in a hundred of each contributes.
+      for (std::uint64_t path = 0; path < kPathsPerCell; ++path) {
+        if (path % 16'384 % 100 == 0) {
+          const double x = sample(cell, path, i);
+          sum += x;
+          squares += x * x;
+        }
+      }
+      const double mean = sum / kPathsPerCell;
+      const double variance = (squares - sum * mean) / (kPathsPerCell - 1);
+      const double error = std::sqrt(variance / kPathsPerCell);
+      EXPECT_NEAR(db.transfer[cell * matrix + i], mean, 5e-4 * mean) << i;
+      EXPECT_NEAR(db.transfer_se[cell * matrix + i], error, 5e-4 * error) << i;
+    }
+  }
+}
+
+TEST_F(CommitTest, Merge_GivesTheSameSumsHoweverACellIsCut) {
+  const auto folded = [](std::uint32_t paths_per_shard) {
+    Results results;
+    storage::FabricDatabase db;
+    db.cell_coordinates = {0, 0, 0, 1, 0, 0};
+    FinishedStage transfer;
+    transfer.stage.name = StageName::kTransfer;
+    v1::TransferSpec& spec = *transfer.stage.spec.mutable_transfer();
+    spec.set_sh_order(kOrder);
+    spec.set_paths_per_cell(10'000);
+    spec.set_paths_per_shard(paths_per_shard);
+    const std::uint64_t blocks = 10'000 / paths_per_shard;
+    for (std::uint64_t shard = 0; shard < kCells * blocks; ++shard) {
+      results.put(StageName::kTransfer, shard, kCells * blocks,
+                  v1::serialize(transfer_result(shard / blocks, shard % blocks * paths_per_shard,
+                                                paths_per_shard)));
+    }
+    transfer.shards = results.of(StageName::kTransfer).shards;
+    fold_transfer(transfer, results.reader(), db);
+    return db;
+  };
+  const storage::FabricDatabase whole = folded(10'000);
+  for (const std::uint32_t paths_per_shard : {100U, 1000U, 5000U}) {
+    const storage::FabricDatabase cut = folded(paths_per_shard);
+    EXPECT_EQ(cut.transfer, whole.transfer) << paths_per_shard;
+    EXPECT_EQ(cut.transfer_se, whole.transfer_se) << paths_per_shard;
+  }
+}
+
+TEST_F(CommitTest, FileSaysWhatItWasMadeFrom) {
+  Results results;
+  results.run_job(0);
+  commit(description(), results.stages, results.reader(), path_);
+  const storage::FabricDatabase db = storage::read_database(path_);
+  v1::FabricDescription read;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(db.description_json, &read).ok());
+  EXPECT_EQ(v1::canonical_bytes(read), v1::canonical_bytes(description()));
+  EXPECT_THAT(db.stages_json, HasSubstr(std::to_string(rotation_seed(description()))));
+  EXPECT_THAT(db.stages_json, HasSubstr("\"results_sha256\""));
+  EXPECT_EQ(db.materials[0].c_r.y, 0.25F);
+  EXPECT_NEAR(db.materials[0].beta_tt, 0.34906585, 1e-6);
+  EXPECT_EQ(db.sigma_shadow_mm, 0.25F);
+}
+
+TEST_F(CommitTest, MalformedResultsAreRefusedNamingStageAndShard) {
+  EXPECT_THAT(refusal(StageName::kTransfer, 4, std::string("not an envelope")),
+              HasSubstr("stage transfer, shard 4"));
+  EXPECT_THAT(refusal(StageName::kGeometry, 0, std::string("x")),
+              HasSubstr("stage geometry, shard 0"));
+  EXPECT_THAT(refusal(StageName::kGrid, 0, v1::Arrays()), HasSubstr("stage grid, shard 0"));
+  EXPECT_THAT(refusal(StageName::kCoefficients, 2, v1::Arrays()),
+              testing::AllOf(HasSubstr("stage coefficients, shard 2"), HasSubstr("missing")));
+  EXPECT_THAT(refusal(StageName::kCoefficients, 2, coefficients_result(0, 2)),
+              testing::AllOf(HasSubstr("stage coefficients, shard 2"), HasSubstr("has shape")));
+  EXPECT_THAT(refusal(StageName::kBasis, 0, grid_result()), HasSubstr("stage basis, shard 0"));
+
+  v1::Arrays wrong = coefficients_result(1, 3);
+  (*wrong.mutable_arrays(0)->mutable_data())[1] = 0x7c;  // an infinite half
+  EXPECT_THAT(refusal(StageName::kCoefficients, 1, wrong),
+              testing::AllOf(HasSubstr("stage coefficients, shard 1"), HasSubstr("not finite")));
+  wrong = coefficients_result(1, 3);
+  (*wrong.mutable_arrays(3)->mutable_data())[2] = 1;  // a rotation of 65536
+  EXPECT_THAT(refusal(StageName::kCoefficients, 1, wrong), HasSubstr("more than a turn"));
+  wrong = transfer_result(0, 0, 100);
+  EXPECT_THAT(refusal(StageName::kTransfer, 1, wrong),
+              testing::AllOf(HasSubstr("stage transfer, shards 0 to 2"), HasSubstr("paths")));
+  wrong = transfer_result(0, 0, 16'384);
+  (*wrong.mutable_arrays(2)->mutable_data())[7] = static_cast<char>(0x80);  // a negative sum
+  EXPECT_THAT(refusal(StageName::kTransfer, 1, wrong),
+              testing::AllOf(HasSubstr("stage transfer, shard 1"), HasSubstr("negative")));
+}
+
+TEST_F(CommitTest, UnfinishedJobsAreRefused) {
+  Results results;
+  results.run_job(0);
+  results.of(StageName::kTransfer).shards.pop_back();
+  EXPECT_THAT(refusal(results), HasSubstr("stage transfer has 5 results where 6 were planned"));
+  std::erase_if(results.stages,
+                [](const StageResults& r) { return r.name == StageName::kTransfer; });
+  EXPECT_THAT(refusal(results), HasSubstr("stage transfer has no results yet"));
+}
+
+}  // namespace
+}  // namespace weft::coordinator
