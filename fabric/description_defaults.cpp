@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/error.h"
+#include "fabric/build.h"
 #include "fabric/ply.h"
 
 namespace weft::fabric {
@@ -52,8 +54,19 @@ void expand_yarn(v1::Yarn& yarn) {
   fill(migration, &Migration::has_rate, &Migration::set_rate, 1);
   fill(migration, &Migration::has_density_power, &Migration::set_density_power, 0.4);
   fill(migration, &Migration::has_core, &Migration::set_core, 0);
-  yarn.mutable_hairs();
-  yarn.mutable_loops();
+  fill(*yarn.mutable_hairs(), &v1::Hairs::has_per_mm, &v1::Hairs::set_per_mm, 0);
+  fill(*yarn.mutable_loops(), &v1::Loops::has_per_mm, &v1::Loops::set_per_mm, 0);
+}
+
+void expand_material(v1::Material& material) {
+  const auto widen = [&](double value, void (v1::Material::*set)(double), double otherwise) {
+    if (value == 0) {
+      (material.*set)(otherwise);
+    }
+  };
+  widen(material.beta_r_deg(), &v1::Material::set_beta_r_deg, 5);
+  widen(material.beta_tt_deg(), &v1::Material::set_beta_tt_deg, 10);
+  widen(material.gamma_tt_deg(), &v1::Material::set_gamma_tt_deg, 25);
 }
 
 void expand_precompute(v1::Precompute& settings) {
@@ -81,11 +94,35 @@ void expand_precompute(v1::Precompute& settings) {
   fill(settings, &Settings::has_sg_sharpness, &Settings::set_sg_sharpness, 128);
 }
 
+// Lowers fibre_share until the tile has about kPreviewSegments. Fewer fibres of the same cover are
+// thicker by the root of the share, and so are their segments longer: segments go with its power
+// 3/2, as far as every ply keeps its fibres and every fibre its bends.
+void thin_for_preview(v1::FabricDescription& description) {
+  constexpr double kLeastShare = 0.001;
+  constexpr int kMostSteps = 4;
+  v1::Exemplar& exemplar = *description.mutable_exemplar();
+  std::uint64_t segments = estimate_tile(description).segments;
+  for (int step = 0; step < kMostSteps && segments > kPreviewSegments * 11 / 10; ++step) {
+    const double before = exemplar.fibre_share();
+    const double excess = static_cast<double>(segments) / kPreviewSegments;
+    exemplar.set_fibre_share(std::max(kLeastShare, before * std::pow(excess, -2.0 / 3)));
+    try {
+      segments = estimate_tile(description).segments;
+    } catch (const core::Error&) {
+      exemplar.set_fibre_share(before);  // so few fibres are too thick for their plies
+      break;
+    }
+  }
+}
+
 }  // namespace
 
 void expand_defaults(v1::FabricDescription& description) {
   for (v1::Yarn& yarn : *description.mutable_yarns()) {
     expand_yarn(yarn);
+  }
+  for (v1::Material& material : *description.mutable_materials()) {
+    expand_material(material);
   }
   if (description.has_yarn_curves() && description.yarn_curves().scale() == 0) {
     description.mutable_yarn_curves()->set_scale(1000);
@@ -114,14 +151,28 @@ void apply_quality(v1::FabricDescription& description) {
     exemplar.set_segment_length_radii(std::max(exemplar.segment_length_radii(), 12.0));
     exemplar.set_repeats_x(1);
     exemplar.set_repeats_y(1);
+    thin_for_preview(description);
   } else if (settings.quality() == v1::QUALITY_BEST) {
     settings.set_sh_order(std::max(settings.sh_order(), 5U));
     settings.set_paths_per_cell(std::max(settings.paths_per_cell(), 200000U));
-    settings.set_visibility_resolution(std::max(settings.visibility_resolution(), 256U));
-    settings.set_pca_sample_segments(std::max(settings.pca_sample_segments(), 8192U));
+    settings.set_visibility_resolution(std::max(settings.visibility_resolution(), 128U));
+    settings.set_pca_sample_segments(std::max(settings.pca_sample_segments(), 4096U));
     settings.set_pca_components(std::max(settings.pca_components(), 64U));
     settings.set_cell_length_mfp(std::min(settings.cell_length_mfp(), 1.0));
     exemplar.set_segment_length_radii(std::min(exemplar.segment_length_radii(), 4.0));
+  }
+}
+
+void check_size(const v1::FabricDescription& description) {
+  const TileEstimate tile = estimate_tile(description);
+  if (tile.memory_bytes > kTileLimitBytes) {
+    throw core::Error(core::Code::kResourceExhausted,
+                      "the tile would have " + std::to_string(tile.fibres) + " fibres and " +
+                          std::to_string(tile.segments) + " segments and need " +
+                          std::to_string((tile.memory_bytes >> 20) + 1) + " MiB, the limit is " +
+                          std::to_string(kTileLimitBytes >> 20) +
+                          " MiB; crop the draft (weave.crop), repeat it less often, or lower "
+                          "exemplar.fibre_share");
   }
 }
 

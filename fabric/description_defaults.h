@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "proto/weft/v1/fabric.pb.h"
 
 namespace weft::fabric {
@@ -17,9 +19,17 @@ inline constexpr double kDefaultSegmentLengthRadii = 8;
 // sense give defaults that make no sense: check afterwards.
 void expand_defaults(v1::FabricDescription& description);
 
-// Bounds the fields that set the cost by the description's quality. Preview lowers what is above
-// its bounds, best raises what is below; paper changes nothing. Doing it twice changes nothing.
-// REQUIRES: defaults are expanded.
+// What a tile of preview quality is thinned to: at this many segments a whole precomputation takes
+// a minute or two on two cores.
+inline constexpr std::uint64_t kPreviewSegments = 5000;
+
+// Bounds the fields that set the cost by the description's quality, as fabric.proto states at
+// Quality. Fields that the description sets are bounded, too. Doing it twice changes nothing.
+// REQUIRES: check_fields finds no mistake.
 void apply_quality(v1::FabricDescription& description);
+
+// Throws core::Error(kResourceExhausted) when the tile would need more than kTileLimitBytes
+// (fabric/build.h), and what estimate_tile throws. REQUIRES: check_fields finds no mistake.
+void check_size(const v1::FabricDescription& description);
 
 }  // namespace weft::fabric

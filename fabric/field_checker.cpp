@@ -1,0 +1,77 @@
+#include "fabric/field_checker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fabric/description_check.h"
+
+namespace weft::fabric {
+namespace {
+
+std::string allowed(const Bounds& bounds) {
+  return (bounds.open_low ? "a number above " : "a number from ") + shortest(bounds.low) +
+         (bounds.open_low ? " up to " : " to ") + shortest(bounds.high) + " is needed";
+}
+
+bool within(double value, const Bounds& bounds) {
+  return std::isfinite(value) && value <= bounds.high &&
+         (bounds.open_low ? value > bounds.low : value >= bounds.low);
+}
+
+}  // namespace
+
+bool is_name(std::string_view text) {
+  constexpr std::size_t kLongest = 64;
+  const auto plain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); };
+  return !text.empty() && text.size() <= kLongest && plain(text.front()) &&
+         std::all_of(text.begin(), text.end(),
+                     [&](char c) { return plain(c) || c == '_' || c == '-'; });
+}
+
+FieldChecker FieldChecker::at(const std::string& field) const {
+  return {mistakes_, path_.empty() ? field : path_ + "." + field};
+}
+
+FieldChecker FieldChecker::at(const std::string& field, int index) const {
+  return at(field + "[" + std::to_string(index) + "]");
+}
+
+void FieldChecker::wrong(const std::string& field, const std::string& message) const {
+  constexpr std::size_t kMost = 100;
+  if (mistakes_.size() < kMost) {
+    mistakes_.push_back({field.empty() ? path_ : at(field).path_, message});
+  }
+}
+
+void FieldChecker::number(const std::string& field, double value, const Bounds& bounds) const {
+  if (!within(value, bounds)) {
+    wrong(field, field + " is " + shortest(value) + "; " + allowed(bounds));
+  }
+}
+
+void FieldChecker::needed(const std::string& field, double value, const Bounds& bounds) const {
+  if (value == 0) {
+    wrong(field, field + " is missing; " + allowed(bounds));
+  } else {
+    number(field, value, bounds);
+  }
+}
+
+void FieldChecker::name(const std::string& field, const std::string& value) const {
+  if (value.empty()) {
+    wrong(field, field + " is missing; give one of small letters, digits, _ and -");
+  } else if (!is_name(value)) {
+    wrong(field, in_quotes(value) + " is no name; use small letters, digits, _ and -, at most 64");
+  }
+}
+
+void FieldChecker::known(const std::string& field, const std::string& value,
+                         const std::vector<std::string>& known, const std::string& kind) const {
+  if (value.empty()) {
+    wrong(field, field + " is missing; name one of the " + kind + "s" + suggestion("", known));
+  } else if (std::find(known.begin(), known.end(), value) == known.end()) {
+    wrong(field, "there is no " + kind + " " + in_quotes(value) + suggestion(value, known));
+  }
+}
+
+}  // namespace weft::fabric

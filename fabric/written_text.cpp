@@ -1,0 +1,178 @@
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <tuple>
+#include <utility>
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/io/tokenizer.h>
+#include <google/protobuf/text_format.h>
+
+#include "fabric/written_description.h"
+
+namespace weft::fabric {
+namespace {
+
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::TextFormat;
+
+struct Place {
+  int line = 0;  // from 0, as protobuf counts
+  int column = 0;
+};
+
+std::string between(const std::string& text, const std::string& before, const std::string& after) {
+  const std::size_t from = text.find(before);
+  if (from == std::string::npos) {
+    return "";
+  }
+  const std::size_t start = from + before.size();
+  const std::size_t end = text.find(after, start);
+  return end == std::string::npos ? "" : text.substr(start, end - start);
+}
+
+const Descriptor* message_type(const std::string& full_name) {
+  return v1::FabricDescription::descriptor()->file()->pool()->FindMessageTypeByName(full_name);
+}
+
+// The values that an enumeration field called `name` takes, wherever in the schema it is.
+std::string enum_values(const std::string& name) {
+  const auto* file = v1::FabricDescription::descriptor()->file();
+  for (int m = 0; m < file->message_type_count(); ++m) {
+    const FieldDescriptor* field = file->message_type(m)->FindFieldByName(name);
+    if (field == nullptr || field->enum_type() == nullptr) {
+      continue;
+    }
+    std::string list;
+    for (int v = 1; v < field->enum_type()->value_count(); ++v) {
+      list.append(v == 1 ? "; use " : ", ").append(field->enum_type()->value(v)->name());
+    }
+    return list;
+  }
+  return "";
+}
+
+// The parser's message with what would be right.
+std::string mended(const std::string& message) {
+  const std::string field = between(message, "has no field named \"", "\"");
+  if (const Descriptor* type = message_type(between(message, "Message type \"", "\""));
+      type != nullptr && !field.empty()) {
+    std::vector<std::string> known;
+    for (int f = 0; f < type->field_count(); ++f) {
+      known.push_back(type->field(f)->name());
+    }
+    return in_quotes(field) + " is no field of " + type->name() + suggestion(field, known);
+  }
+  if (message.starts_with("Unknown enumeration value")) {
+    const std::string value = between(message, "value of \"", "\"");
+    const std::string of = between(message, "for field \"", "\"");
+    return in_quotes(value) + " is no value of " + of + enum_values(of);
+  }
+  return message;
+}
+
+class TextCollector : public google::protobuf::io::ErrorCollector {
+ public:
+  void AddError(int line, google::protobuf::io::ColumnNumber column,
+                const std::string& message) override {
+    add(line, column, message);
+    failed_ = true;
+  }
+  // Unknown fields come as warnings, so that parsing goes on behind them.
+  void AddWarning(int line, google::protobuf::io::ColumnNumber column,
+                  const std::string& message) override {
+    add(line, column, message);
+  }
+  [[nodiscard]] bool failed() const { return failed_; }
+  [[nodiscard]] const std::vector<std::pair<Place, std::string>>& all() const { return all_; }
+
+ private:
+  void add(int line, int column, const std::string& message) {
+    constexpr std::size_t kMost = 100;
+    if (all_.size() < kMost) {
+      all_.push_back({{std::max(line, 0), std::max(column, 0)}, mended(message)});
+    }
+  }
+
+  std::vector<std::pair<Place, std::string>> all_;
+  bool failed_ = false;
+};
+
+class TextDescription : public WrittenDescription {
+ public:
+  TextDescription(std::string_view text, std::string name) : name_(std::move(name)) {
+    constexpr int kDeepest = 32;
+    TextFormat::Parser parser;
+    parser.RecordErrorsTo(&collector_);
+    parser.WriteLocationsTo(&places_);
+    parser.AllowUnknownField(true);
+    parser.SetRecursionLimit(kDeepest);
+    unreadable_ = !parser.ParseFromString(std::string(text), &message_) || collector_.failed();
+  }
+
+  [[nodiscard]] std::string listing(const Mistakes& further) const override {
+    std::vector<std::tuple<int, int, std::string>> all;
+    for (const auto& [place, message] : collector_.all()) {
+      all.emplace_back(place.line, place.column, message);
+    }
+    for (const Mistake& mistake : further) {
+      const Place place = place_of(mistake.path);
+      all.emplace_back(place.line, place.column, mistake.message);
+    }
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
+      return std::tie(std::get<0>(a), std::get<1>(a)) < std::tie(std::get<0>(b), std::get<1>(b));
+    });
+    std::string lines;
+    for (const auto& [line, column, message] : all) {
+      lines.append(lines.empty() ? "" : "\n").append(name_).append(":");
+      lines.append(std::to_string(line + 1)).append(":").append(std::to_string(column + 1));
+      lines.append(": ").append(message);
+    }
+    return lines;
+  }
+
+ private:
+  // Where the field at `path` is written, or the innermost message round it that is.
+  [[nodiscard]] Place place_of(const std::string& path) const {
+    Place place;
+    const TextFormat::ParseInfoTree* tree = &places_;
+    const Descriptor* type = v1::FabricDescription::descriptor();
+    for (std::size_t at = 0; at < path.size() && tree != nullptr && type != nullptr;) {
+      const std::size_t end = std::min(path.find('.', at), path.size());
+      std::string step = path.substr(at, end - at);
+      at = end + 1;
+      int index = 0;
+      if (const std::size_t bracket = step.find('['); bracket != std::string::npos) {
+        index = std::atoi(step.c_str() + bracket + 1);
+        step.resize(bracket);
+      }
+      const FieldDescriptor* field = type->FindFieldByName(step);
+      if (field == nullptr) {
+        break;
+      }
+      const int which = field->is_repeated() ? index : -1;
+      const TextFormat::ParseLocation location = tree->GetLocation(field, which);
+      if (location.line < 0) {
+        break;
+      }
+      place = {location.line, location.column};
+      type = field->message_type();
+      tree = type != nullptr ? tree->GetTreeForNested(field, which) : nullptr;
+    }
+    return place;
+  }
+
+  std::string name_;
+  TextCollector collector_;
+  TextFormat::ParseInfoTree places_;
+};
+
+}  // namespace
+
+std::unique_ptr<WrittenDescription> read_text(std::string_view text, const std::string& name) {
+  return std::make_unique<TextDescription>(text, name);
+}
+
+}  // namespace weft::fabric
