@@ -216,7 +216,9 @@ std::vector<std::uint8_t> draw_tile(const fabric::Tile& tile, const std::vector<
   const glm::vec3 to_eye{std::sin(tilt) * std::sin(turn), -std::sin(tilt) * std::cos(turn),
                          std::cos(tilt)};
   eye.rotation = look_along(to_eye, turn);
-  const glm::vec3 to_light = glm::normalize(glm::vec3(-0.55F, 0.45F, 1.0F));
+  // From the viewer's upper left, so that what is seen is lit.
+  const glm::vec3 to_light =
+      glm::transpose(eye.rotation) * glm::normalize(glm::vec3(-0.55F, 0.6F, 1.0F));
   const std::vector<Hit> hits = find_hits(tile, eye);
   const ShadowMap shadows = map_shadows(tile, eye, to_light);
 

@@ -70,7 +70,7 @@ void lay_threads(const v1::FabricDescription& description, const YarnLayout& lay
     const v1::Yarn& yarn = description.yarns(static_cast<int>(curve.yarn));
     std::optional<YarnModel>& model = models[curve.yarn];
     if (!model) {
-      model = yarn_model(yarn, description.exemplar());
+      model = yarn_model(yarn, curve.radius_mm, description.exemplar());
     }
     const ThreadPath path(curve, layout.size_mm);
     const auto thread = static_cast<std::uint32_t>(tile.threads.size());

@@ -28,16 +28,14 @@ std::uint64_t whole(double value) {
 }
 
 // `count` threads of one yarn, each this long.
-void add_threads(Sum& sum, const v1::FabricDescription& description, std::uint32_t yarn_number,
-                 double count, double length_mm) {
-  const v1::Yarn& yarn = description.yarns(static_cast<int>(yarn_number));
-  const YarnModel model = yarn_model(yarn, description.exemplar());
-  const double segment = description.exemplar().segment_length_radii() * model.fibre_radius_mm;
+void add_threads(Sum& sum, const v1::Exemplar& exemplar, const v1::Yarn& yarn,
+                 const YarnModel& model, double count, double length_mm) {
+  const double segment = exemplar.segment_length_radii() * model.fibre_radius_mm;
   const double regular = count * model.plies * model.fibres_per_ply;
   const double hairs = count * expected_hairs(yarn, model, length_mm);
   sum.fibres += regular + hairs;
   sum.segments += regular * std::max(2.0, std::nearbyint(length_mm / segment)) +
-                  hairs * std::max(2.0, std::nearbyint(mean_hair_length_mm(yarn) / segment));
+                  hairs * std::max(2.0, std::nearbyint(mean_hair_length_mm(yarn, model) / segment));
 }
 
 void fill(TileEstimate& estimate, const Sum& sum) {
@@ -74,7 +72,10 @@ Sum straight_weave(const v1::FabricDescription& description, const Draft& draft)
     }
     for (std::size_t y = 0; y < threads.size(); ++y) {
       if (threads[y] > 0) {
-        add_threads(sum, description, static_cast<std::uint32_t>(y), threads[y], length);
+        const v1::Yarn& yarn = description.yarns(static_cast<int>(y));
+        add_threads(sum, description.exemplar(), yarn,
+                    yarn_model(yarn, yarn.yarn_radius_mm(), description.exemplar()), threads[y],
+                    length);
       }
     }
     sum.nodes += static_cast<double>(yarns.size()) * crossings * repeats_across * repeats_along *
@@ -107,8 +108,10 @@ TileEstimate estimate_tile(const v1::FabricDescription& description) {
   Sum sum;
   for (const YarnCurve& curve : layout.curves) {
     const double joined = copies_joined(curve, repeats_x, repeats_y);
-    add_threads(sum, description, curve.yarn, repeats_x * repeats_y / joined,
-                length_mm(curve, layout.size_mm) * joined);
+    const v1::Yarn& yarn = description.yarns(static_cast<int>(curve.yarn));
+    add_threads(sum, description.exemplar(), yarn,
+                yarn_model(yarn, curve.radius_mm, description.exemplar()),
+                repeats_x * repeats_y / joined, length_mm(curve, layout.size_mm) * joined);
     sum.nodes += static_cast<double>(curve.nodes.size()) * repeats_x * repeats_y;
   }
   fill(estimate, sum);

@@ -65,10 +65,10 @@ double expected_hairs(const v1::Yarn& yarn, const YarnModel& model, double lengt
   return yarn.hairs().per_mm() * length_mm * model.share;
 }
 
-double mean_hair_length_mm(const v1::Yarn& yarn) {
+double mean_hair_length_mm(const v1::Yarn& yarn, const YarnModel& model) {
   const v1::Hairs& hairs = yarn.hairs();
-  const double rise = hairs.reach_mm() + 0.5 * (1 - kInnermostRoot) * yarn.yarn_radius_mm();
-  const double arc = kDegree * hairs.sweep_deg() * (yarn.yarn_radius_mm() + 0.5 * hairs.reach_mm());
+  const double rise = hairs.reach_mm() + 0.5 * (1 - kInnermostRoot) * model.yarn_radius_mm;
+  const double arc = kDegree * hairs.sweep_deg() * (model.yarn_radius_mm + 0.5 * hairs.reach_mm());
   return length_of(hairs.length_mm(), rise, arc);
 }
 

@@ -10,7 +10,7 @@ namespace weft::fabric {
 [[nodiscard]] double expected_hairs(const v1::Yarn& yarn, const YarnModel& model, double length_mm);
 
 // Length of the mean hair, from root to tip.
-[[nodiscard]] double mean_hair_length_mm(const v1::Yarn& yarn);
+[[nodiscard]] double mean_hair_length_mm(const v1::Yarn& yarn, const YarnModel& model);
 
 // Appends the thread's hairs: strands with period (0, 0) whose root lies in the yarn and whose tip
 // stands out of it. Distance from the axis, angle and place along the yarn change evenly from root

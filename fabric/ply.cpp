@@ -30,15 +30,16 @@ PlySection ply_section(std::uint32_t plies, double aspect) {
   return {distance / reach, aspect / reach, 1 / reach};
 }
 
-YarnModel yarn_model(const v1::Yarn& yarn, const v1::Exemplar& exemplar) {
+YarnModel yarn_model(const v1::Yarn& yarn, double yarn_radius_mm, const v1::Exemplar& exemplar) {
   YarnModel model;
   model.plies = yarn.plies();
   const double described = yarn.fibres_per_ply();
   model.fibres_per_ply =
       static_cast<std::uint32_t>(std::max(1.0, std::nearbyint(described * exemplar.fibre_share())));
   model.share = model.fibres_per_ply / described;
-  model.fibre_radius_mm = yarn.fibre_radius_mm() / std::sqrt(model.share);
-  model.yarn_radius_mm = yarn.yarn_radius_mm();
+  model.fibre_radius_mm =
+      yarn.fibre_radius_mm() * (yarn_radius_mm / yarn.yarn_radius_mm()) / std::sqrt(model.share);
+  model.yarn_radius_mm = yarn_radius_mm;
   model.section = ply_section(model.plies, yarn.ply_aspect());
 
   const double area =

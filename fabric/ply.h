@@ -30,9 +30,12 @@ struct YarnModel {
 // fibre_share keeps max(1, round(share n)) of a ply's n fibres and makes them thicker so that they
 // fill the same area: the radius grows by sqrt(n / kept). (Projected cover falls by the same
 // factor; growing by n / kept would keep it, but soon packs fibres denser than there is room.)
-// Throws core::Error(kInvalidArgument) when the fibres would fill more than kDensestPacking of
+// `yarn_radius_mm` is the yarn's own or one that its curves prescribe, to which the
+// fibres' radius is scaled along. Throws
+// core::Error(kInvalidArgument) when the fibres would fill more than kDensestPacking of
 // their ply, or one alone does not fit.
-[[nodiscard]] YarnModel yarn_model(const v1::Yarn& yarn, const v1::Exemplar& exemplar);
+[[nodiscard]] YarnModel yarn_model(const v1::Yarn& yarn, double yarn_radius_mm,
+                                   const v1::Exemplar& exemplar);
 
 // Circles of equal size fill at most pi / (2 sqrt(3)) of the plane.
 inline constexpr double kDensestPacking = 0.9069;

@@ -112,6 +112,10 @@ class Relaxation {
       const glm::dvec3 tension = 0.5 * near - at;
       const glm::dvec3 bending = (4.0 * near - far) / 6.0 - at;
       glm::dvec3 anchor = rest_.centres_mm[n] - at;
+      if (curve(n).role == Role::kCurve) {
+        moved[n] = at + strength * (kBending * bending + kAnchor * anchor);
+        continue;
+      }
       anchor.z = 0;
       moved[n] = at + strength * (kTension * tension + kBending * bending) + kAnchor * anchor;
     }
@@ -214,6 +218,12 @@ RelaxReport relax(YarnLayout& layout) {
     return {};
   }
   Relaxation relaxation(layout);
+  if (layout.curves.front().role == Role::kCurve) {
+    const double overlap = relaxation.measure();
+    if (overlap <= kOverlapTolerance) {
+      return {0, overlap};
+    }
+  }
   const RelaxReport report = relaxation.run();
   relaxation.body().write_to(layout);
   return report;

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "core/check.h"
+#include "fabric/catmull_rom.h"
 
 namespace weft::fabric {
 
@@ -14,13 +15,6 @@ namespace {
 constexpr int kSubdivision = 6;  // table entries between two nodes
 // Below this sine of the angle between tangent and reference the reference is no direction.
 constexpr double kParallel = 1e-6;
-
-// Catmull-Rom on one number: passes p1 at f = 0 and p2 at f = 1.
-template <class T>
-T catmull_rom(const T& p0, const T& p1, const T& p2, const T& p3, double f) {
-  return p1 + (p2 - p0) * (0.5 * f) + (p0 * 2.0 - p1 * 5.0 + p2 * 4.0 - p3) * (0.5 * f * f) +
-         (p1 * 3.0 - p0 - p2 * 3.0 + p3) * (0.5 * f * f * f);
-}
 
 glm::dvec3 any_across(glm::dvec3 direction) {
   const glm::dvec3 axis = std::abs(direction.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
