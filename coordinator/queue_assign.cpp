@@ -98,30 +98,40 @@ std::optional<Queue::Run> Queue::next_run(const WorkerState& worker, bool is_bus
   return std::nullopt;
 }
 
-// The first shards in a row, at most `limit`, that this worker may run now.
+// The first shards in a row, at most `limit`, that this worker may run now. Shards that were with
+// workers when those were lost come last, those with the fewest losses first: they may be the
+// cause.
 std::optional<Queue::Run> Queue::run_of(std::uint64_t order, std::size_t index,
                                         const WorkerState& worker, std::uint64_t limit, Time now) {
   StageState& stage = jobs_.at(order).stages[index];
   const std::uint64_t count = stage.shards.size();
-  std::uint64_t i = stage.first_pending;
-  while (i < count && stage.shards[i] != ShardState::kPending) {
-    ++i;
+  while (stage.first_pending < count && stage.shards[stage.first_pending] != ShardState::kPending) {
+    ++stage.first_pending;
   }
-  stage.first_pending = i;
-  while (i < count && !may_run(stage, {order, index, i}, worker, now)) {
-    ++i;
+  const auto may = [&](std::uint64_t shard) {
+    return may_run(stage, {order, index, shard}, worker, now);
+  };
+  for (std::uint64_t i = stage.first_pending; i < count; ++i) {
+    const auto trouble = stage.troubles.find(i);
+    const bool has_trouble = trouble != stage.troubles.end();
+    if ((has_trouble && trouble->second.losses > 0) || !may(i)) {
+      continue;
+    }
+    Run run{order, index, i, 1};
+    // A shard in trouble runs alone, so that it takes no other with it and is found out.
+    while (!has_trouble && run.shards < limit && i + run.shards < count && may(i + run.shards) &&
+           !stage.troubles.contains(i + run.shards)) {
+      ++run.shards;
+    }
+    return run;
   }
-  if (i == count) {
-    return std::nullopt;
-  }
-  Run run{order, index, i, 1};
-  if (stage.troubles.contains(i)) {
-    return run;  // alone, so that it takes nobody with it and is found out
-  }
-  while (run.shards < limit && i + run.shards < count &&
-         may_run(stage, {order, index, i + run.shards}, worker, now) &&
-         !stage.troubles.contains(i + run.shards)) {
-    ++run.shards;
+  std::optional<Run> run;
+  std::uint32_t fewest = ~std::uint32_t{0};
+  for (const auto& [shard, trouble] : stage.troubles) {
+    if (trouble.losses < fewest && may(shard)) {
+      fewest = trouble.losses;
+      run = Run{order, index, shard, 1};
+    }
   }
   return run;
 }
@@ -161,6 +171,7 @@ bool Queue::may_run(const StageState& stage, const ShardRef& ref, const WorkerSt
 std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
                               const WorkerState& worker, bool is_busy, Time now) const {
   std::uint64_t workers = 0;
+  std::uint64_t idle = 0;  // of the others
   std::uint64_t idle_threads = 0;
   for (const auto& [id, other] : workers_) {
     if (!is_live(other, now) || job.fingerprint != other.fingerprint) {
@@ -170,7 +181,10 @@ std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
     const bool has_attempt = std::any_of(attempts_.begin(), attempts_.end(), [&](const auto& a) {
       return a.second.worker == other.id;
     });
-    idle_threads += id != worker.id && !has_attempt ? other.threads : 0;
+    if (id != worker.id && !has_attempt) {
+      ++idle;
+      idle_threads += other.threads;
+    }
   }
   CHECK_GT(workers, 0U);
   const std::uint64_t pending = stage.pending();
@@ -178,7 +192,7 @@ std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
     return 0;
   }
   const std::uint64_t per_thread =
-      std::min<std::uint64_t>(worker.threads, ceil_div(pending, workers));
+      std::min<std::uint64_t>(worker.threads, ceil_div(pending, 1 + idle));
   if (stage.shard_thread_ms <= 0) {
     return std::max<std::uint64_t>(per_thread, 1);  // the first runs of a stage measure it
   }

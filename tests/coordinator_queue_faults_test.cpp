@@ -1,0 +1,376 @@
+#include <gtest/gtest.h>
+
+#include "core/random.h"
+#include "tests/queue_cluster.h"
+
+// Failures, back-off, run sizes, restarts, and whole clusters in virtual time.
+
+namespace weft::coordinator {
+namespace {
+
+std::string name_of(int worker) { return std::string("w").append(std::to_string(worker)); }
+
+TEST(QueueFaults, FailedShard_IsTriedAgainAfterABackOff) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 1);
+  cluster.submit("a", {1});
+  worker.sync(1);
+  worker.fail("it burns");
+  worker.sync(1);
+  EXPECT_TRUE(worker.held.empty());
+  cluster.advance(1'001);
+  worker.sync(1);
+  EXPECT_EQ(worker.held.size(), 1U);
+}
+
+TEST(QueueFaults, FiveFailures_EndTheJobWhichSaysWhy) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 1);
+  cluster.submit("a", {1});
+  for (int i = 0; i < 5; ++i) {
+    cluster.advance(25'000);
+    worker.sync(1);
+    ASSERT_EQ(worker.held.size(), 1U) << i;
+    worker.fail(std::string("fault number ").append(std::to_string(i)));
+    worker.sync();
+    EXPECT_EQ(cluster.job("a").has_ended(), i == 4) << i;
+  }
+  EXPECT_EQ(cluster.job("a").phase, JobPhase::kFailed);
+  const std::string& error = cluster.job("a").error;
+  EXPECT_NE(error.find("geometry shard 0"), std::string::npos) << error;
+  EXPECT_NE(error.find("fault number 4"), std::string::npos) << error;
+}
+
+TEST(QueueFaults, TheSameErrorOnThreeWorkers_EndsTheJob) {
+  QueueCluster cluster;
+  std::vector<QueueWorker> workers;
+  for (const char* id : {"w1", "w2", "w3"}) {
+    workers.emplace_back(cluster, id, 1);
+  }
+  for (QueueWorker& worker : workers) {
+    worker.sync();
+  }
+  cluster.submit("a", {1});
+  for (QueueWorker& worker : workers) {
+    EXPECT_FALSE(cluster.job("a").has_ended());
+    for (QueueWorker& other : workers) {
+      other.sync();
+    }
+    cluster.advance(5'000);
+    worker.sync(1);
+    ASSERT_EQ(worker.held.size(), 1U);
+    worker.fail("it burns");
+    worker.sync();
+  }
+  EXPECT_EQ(cluster.job("a").phase, JobPhase::kFailed);
+}
+
+TEST(QueueFaults, FailedShard_GoesToAWorkerWhereItDidNotFail) {
+  QueueCluster cluster;
+  QueueWorker first(cluster, "first", 1);
+  QueueWorker second(cluster, "second", 1);
+  second.sync();
+  cluster.submit("a", {1});
+  first.sync(1);
+  first.fail("it burns");
+  first.sync();
+  cluster.advance(2'000);
+  first.sync(1);
+  EXPECT_TRUE(first.held.empty());
+  second.sync(1);
+  EXPECT_EQ(second.held.size(), 1U);
+}
+
+TEST(QueueFaults, ShardThatFailed_RunsAlone) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 4);
+  cluster.submit("a", {4});
+  worker.sync(1);
+  ASSERT_EQ(worker.held[0].shards, 4U);
+  worker.fail("it burns");
+  worker.sync();
+  cluster.advance(2'000);
+  worker.sync(4);
+  ASSERT_GE(worker.held.size(), 2U);
+  EXPECT_EQ(worker.held[0].first_shard, 0U);
+  EXPECT_EQ(worker.held[0].shards, 1U);
+}
+
+TEST(QueueFaults, ShortResource_CostsNoRetryAndKeepsTheStageAway) {
+  QueueSettings settings;
+  QueueCluster cluster(settings);
+  QueueWorker poor(cluster, "poor", 1);
+  QueueWorker rich(cluster, "rich", 1);
+  cluster.submit("a", {1});
+  std::uint64_t waits_ms = settings.short_ms;
+  for (int i = 0; i < 8; ++i) {
+    poor.sync(1);
+    ASSERT_EQ(poor.held.size(), 1U) << i;
+    poor.fail("out of memory", true);
+    poor.sync(1);
+    EXPECT_TRUE(poor.held.empty());
+    EXPECT_NE(cluster.queue.waiting_for(cluster.job("a"), cluster.now), "");
+    cluster.advance(waits_ms - 1);
+    poor.sync(1);
+    EXPECT_TRUE(poor.held.empty());
+    cluster.advance(1);
+    waits_ms = std::min<std::uint64_t>(2 * waits_ms, settings.short_limit_ms);
+  }
+  EXPECT_EQ(cluster.job("a").stages[0].failures, 0U);
+  rich.sync(1);
+  EXPECT_EQ(rich.held.size(), 1U);
+}
+
+TEST(QueueFaults, ShardThatTakesItsWorkersWithIt_IsIsolatedAndQuarantined) {
+  // Shard 2 kills every worker that runs it.
+  QueueCluster cluster;
+  cluster.submit("a", {6});
+  int workers = 0;
+  while (!cluster.job("a").has_ended() && workers < 40) {
+    QueueWorker worker(cluster, name_of(workers++), 2);
+    bool is_alive = true;
+    while (is_alive && !cluster.job("a").has_ended()) {
+      worker.sync(1);
+      if (worker.held.empty()) {
+        break;
+      }
+      const AssignAction& assign = worker.held[0];
+      is_alive = assign.first_shard > 2 || assign.first_shard + assign.shards <= 2;
+      if (is_alive) {
+        worker.finish();
+      }
+    }
+    cluster.advance(30'001);
+  }
+  EXPECT_EQ(cluster.job("a").phase, JobPhase::kFailed);
+  EXPECT_EQ(cluster.job("a").stages[0].done, 5U);
+  EXPECT_NE(cluster.job("a").error.find("shard 2 of 6"), std::string::npos)
+      << cluster.job("a").error;
+  EXPECT_LE(workers, 12);
+}
+
+TEST(QueueFaults, RunsGrow_UntilTheyTakeTheTargetTime) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 2);
+  cluster.submit("a", {10'000});
+  worker.sync(1);
+  EXPECT_EQ(worker.held[0].shards, 2U);  // nothing measured yet
+  worker.finish(100);                    // 100 ms for one shard on each of two threads
+  worker.sync(1);
+  EXPECT_EQ(worker.held[0].shards, 400U);  // 20 s
+  worker.finish(400 / 2 * 50);             // it was twice as fast
+  worker.sync(1);
+  EXPECT_GT(worker.held[0].shards, 400U);
+  EXPECT_LT(worker.held[0].shards, 800U);
+}
+
+TEST(QueueFaults, SlowShards_AreGivenOneForEachThread) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 4);
+  cluster.submit("a", {100});
+  worker.sync(1);
+  worker.finish(300'000);
+  worker.sync(1);
+  EXPECT_EQ(worker.held[0].shards, 4U);
+}
+
+TEST(QueueFaults, LastShardsOfAStage_AreSharedOut) {
+  QueueCluster cluster;
+  QueueWorker first(cluster, "first", 2);
+  QueueWorker second(cluster, "second", 2);
+  second.sync();
+  cluster.submit("a", {102});
+  first.sync(1);
+  first.finish(1'000);
+  second.sync();
+  first.sync(1);
+  // 20 s would be 40 shards; a share for two workers is 25 of the 100 that are left.
+  EXPECT_EQ(first.held[0].shards, 25U);
+}
+
+TEST(QueueFaults, BusyWorker_LeavesTheLastShardsToIdleOnes) {
+  QueueCluster cluster;
+  QueueWorker busy(cluster, "busy", 2);
+  QueueWorker idle(cluster, "idle", 2);
+  idle.sync();
+  cluster.submit("a", {4});
+  busy.sync(2);
+  ASSERT_EQ(busy.held.size(), 1U);
+  idle.sync(2);
+  ASSERT_FALSE(idle.held.empty());
+  EXPECT_EQ(busy.held[0].shards + idle.held[0].shards, 4U);
+}
+
+TEST(QueueFaults, RestartedCoordinator_TakesItsWorkersBackWithWhatTheyRun) {
+  QueueCluster before({}, 1);
+  QueueWorker old_worker(before, "w", 2);
+  before.submit("a", {6});
+  old_worker.sync(1);
+  ASSERT_EQ(old_worker.held.size(), 1U);
+
+  QueueCluster after({}, 2);
+  QueueWorker worker(after, "w", 2);
+  Reply known;
+  known.assignments = old_worker.held;
+  worker.receive(known);
+  after.hold_plans = true;
+  after.submit("a", {6}, "", core::Digest{});
+  // Still planning: the worker goes on, neither renewed nor stopped.
+  Reply reply = worker.sync();
+  EXPECT_TRUE(reply.stop.empty());
+  EXPECT_TRUE(reply.leases.empty());
+  after.hold_plans = false;
+  after.answer(after.held_plans.at(0));
+  reply = worker.sync(1);
+  ASSERT_EQ(reply.leases.size(), 1U);
+  EXPECT_EQ(reply.leases[0].attempt, old_worker.held[0].attempt);
+  ASSERT_EQ(reply.assignments.size(), 1U);
+  EXPECT_EQ(reply.assignments[0].first_shard, 2U);  // not what it runs already
+  worker.finish();
+  worker.sync();
+  EXPECT_EQ(after.job("a").stages[0].done, 2U);
+}
+
+TEST(QueueFaults, CompletionFromBeforeARestart_WaitsForThePlanAndIsTaken) {
+  QueueCluster before({}, 1);
+  QueueWorker old_worker(before, "w", 6);
+  before.submit("a", {6});
+  old_worker.sync(1);
+
+  QueueCluster after({}, 2);
+  QueueWorker worker(after, "w", 6);
+  Reply known;
+  known.assignments = old_worker.held;
+  worker.receive(known);
+  old_worker.finish();
+  CompletionClaim& claim = worker.finish();
+  for (std::uint64_t shard = 0; shard < 6; ++shard) {
+    claim.results.push_back({shard, QueueCluster::result_of(QueueCluster::work("a", 0, shard)), 1});
+  }
+  after.hold_plans = true;
+  after.submit("a", {6}, "", core::Digest{});
+  worker.sync();
+  EXPECT_TRUE(worker.has_unacknowledged());
+  after.hold_plans = false;
+  after.answer(after.held_plans.at(0));
+  worker.sync();
+  EXPECT_FALSE(worker.has_unacknowledged());
+  EXPECT_EQ(after.job("a").phase, JobPhase::kSucceeded);
+}
+
+TEST(QueueFaults, FailuresFromBeforeARestart_Count) {
+  QueueCluster cluster;
+  cluster.hold_plans = true;
+  cluster.submit("a", {1}, "", core::Digest{});
+  PlannedEvent planned{"a", 0, {}};
+  planned.stages.push_back({all_stages()[0], {QueueCluster::work("a", 0, 0)}, {}, {}});
+  planned.stages[0].failures.assign(4, PriorFailure{0, "earlier", "it burned"});
+  cluster.apply(planned);
+  QueueWorker worker(cluster, "w", 1);
+  worker.sync(1);
+  worker.fail("it burns");
+  worker.sync();
+  EXPECT_EQ(cluster.job("a").phase, JobPhase::kFailed);
+}
+
+// Whole clusters with faults of every kind, from one seed: every job ends with the results that an
+// undisturbed cluster gives, no result is recorded twice, and shards are never lost.
+class QueueSimulation : public testing::TestWithParam<std::uint64_t> {
+ protected:
+  struct Member {
+    std::unique_ptr<QueueWorker> worker;
+    std::uint64_t silent_until = 0;  // turns
+  };
+
+  void turn(Member& member, std::uint64_t now) {
+    QueueWorker& worker = *member.worker;
+    if (now < member.silent_until) {
+      return;
+    }
+    if (!worker.held.empty() && random_.below(3) != 0) {
+      const std::uint32_t fate = random_.below(20);
+      if (fate == 0) {
+        worker.fail("it burns");
+      } else if (fate == 1) {
+        worker.fail("out of memory", true);
+      } else if (fate == 2) {
+        worker.finish(random_.below(5'000), random_.below(3));
+      } else {
+        worker.finish(random_.below(5'000));
+      }
+    }
+    const Reply reply = worker.send(random_.below(3));
+    if (random_.below(8) != 0) {  // else the answer is lost
+      worker.receive(reply);
+    }
+    if (random_.below(15) == 0) {
+      member.silent_until = now + random_.below(60);  // may outlast its leases
+    }
+    if (random_.below(40) == 0) {  // killed, and another one starts
+      member.worker =
+          std::make_unique<QueueWorker>(*cluster_, name_of(++started_), 1 + random_.below(4));
+    }
+  }
+
+  void check_invariants() const {
+    for (const JobState* job : cluster_->queue.jobs()) {
+      for (const StageState& stage : job->stages) {
+        std::uint64_t running = 0;
+        std::uint64_t done = 0;
+        for (std::size_t i = 0; i < stage.shards.size(); ++i) {
+          running += stage.shards[i] == ShardState::kRunning ? 1 : 0;
+          done += stage.shards[i] == ShardState::kDone ? 1 : 0;
+          if (stage.shards[i] == ShardState::kPending && !job->has_ended()) {
+            ASSERT_GE(i, stage.first_pending);
+          }
+          if (stage.shards[i] == ShardState::kDone) {
+            ASSERT_EQ(stage.results[i], QueueCluster::result_of(stage.digests[i]));
+          }
+        }
+        ASSERT_EQ(running, stage.running);
+        ASSERT_EQ(done, stage.done);
+      }
+    }
+  }
+
+  core::Random random_{GetParam(), 7};
+  QueueSettings settings_ = [] {
+    QueueSettings settings;
+    settings.failure_limit = 1'000;  // so that chance alone does not fail a job
+    settings.same_error_limit = 1'000;
+    settings.lonely_loss_limit = 1'000;
+    return settings;
+  }();
+  std::unique_ptr<QueueCluster> cluster_ = std::make_unique<QueueCluster>(settings_);
+  int started_ = 0;
+};
+
+TEST_P(QueueSimulation, EveryJobEndsWithTheSameResultsUnderAnyFaults) {
+  std::vector<Member> members(4);
+  for (Member& member : members) {
+    member.worker =
+        std::make_unique<QueueWorker>(*cluster_, name_of(++started_), 1 + random_.below(4));
+  }
+  cluster_->submit("a", {1, 20, 3, 17}, "same");
+  cluster_->submit("b", {1, 20, 5}, "same");
+  cluster_->submit("c", {1, 9}, "other");
+  std::uint64_t turns = 0;
+  for (; cluster_->ended.size() < 3 && turns < 20'000; ++turns) {
+    cluster_->advance(random_.below(2'000));
+    turn(members[random_.below(4)], turns);
+    ASSERT_NO_FATAL_FAILURE(check_invariants()) << "seed " << GetParam() << " turn " << turns;
+  }
+  ASSERT_EQ(cluster_->ended.size(), 3U) << "seed " << GetParam();
+  for (const JobState* job : cluster_->queue.jobs()) {
+    EXPECT_EQ(job->phase, JobPhase::kSucceeded) << job->error;
+  }
+  for (const auto& [work, times] : cluster_->results_recorded) {
+    EXPECT_EQ(times, 1);
+  }
+  EXPECT_TRUE(cluster_->queue.attempts().empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, QueueSimulation, testing::Range<std::uint64_t>(1, 41));
+
+}  // namespace
+}  // namespace weft::coordinator

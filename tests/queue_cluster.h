@@ -1,0 +1,198 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coordinator/queue.h"
+#include "core/digest.h"
+
+namespace weft::coordinator {
+
+// A queue with a planner, a committer and a cache of results around it, in one thread and virtual
+// time: what the coordinator's service is to the real one.
+class QueueCluster {
+ public:
+  using Ms = std::chrono::milliseconds;
+
+  explicit QueueCluster(QueueSettings settings = {}, std::uint32_t epoch = 1)
+      : queue(settings, epoch) {}
+
+  // A job of stages with so many shards each; `content` tells equal work from different work.
+  void submit(const std::string& job, std::vector<std::uint64_t> shards,
+              const std::string& content = "", std::optional<core::Digest> fingerprint = {}) {
+    plans_[job] = {std::move(shards), content.empty() ? job : content};
+    apply(SubmitEvent{job, "fabric", fingerprint, now});
+  }
+
+  // What a shard's work is called and what its result is.
+  static core::Digest work(const std::string& content, std::uint64_t stage, std::uint64_t shard,
+                           const core::Digest& fingerprint = {}) {
+    return core::digest_of(content + "/" + std::to_string(stage) + "/" + std::to_string(shard) +
+                           "/" + fingerprint.hex());
+  }
+  static core::Digest result_of(const core::Digest& work) { return core::digest_of(work.hex()); }
+
+  Actions apply(const Event& event) {
+    Actions actions = queue.apply(event, now);
+    for (const ResultRecord& record : actions.results) {
+      results_recorded[record.shard] += 1;
+      cache[record.shard] = record.result;
+    }
+    for (const std::string& job : actions.ended) {
+      ended.push_back(job);
+    }
+    if (!hold_plans) {
+      for (const PlanAction& plan : actions.plan) {
+        answer(plan);
+      }
+      for (const CommitAction& commit : actions.commit) {
+        apply(CommittedEvent{commit.job, commit.generation});
+      }
+    } else {
+      held_plans.insert(held_plans.end(), actions.plan.begin(), actions.plan.end());
+    }
+    return actions;
+  }
+
+  void answer(const PlanAction& plan) {
+    const JobState* const job = queue.job(plan.job);
+    if (job == nullptr) {
+      return;
+    }
+    const auto& [shards, content] = plans_.at(plan.job);
+    const std::size_t done = queue.finished_stages(*job).size();
+    PlannedEvent event{plan.job, plan.generation, {}};
+    if (done < shards.size()) {
+      PlannedStage stage;
+      stage.name = all_stages()[done];
+      for (std::uint64_t i = 0; i < shards[done]; ++i) {
+        stage.digests.push_back(work(content, done, i, plan.fingerprint));
+        const auto known = cache.find(stage.digests.back());
+        if (known != cache.end()) {
+          stage.known.push_back({i, known->second});
+        }
+      }
+      event.stages.push_back(std::move(stage));
+    }
+    apply(event);
+  }
+
+  void advance(std::uint64_t ms) {
+    now += Ms(ms);
+    apply(TickEvent{});
+  }
+
+  const JobState& job(const std::string& id) const { return *queue.job(id); }
+
+  Queue queue;
+  Time now{std::chrono::hours(1)};
+  bool hold_plans = false;
+  std::vector<PlanAction> held_plans;
+  std::map<core::Digest, core::Digest> cache;
+  std::map<core::Digest, int> results_recorded;
+  std::vector<std::string> ended;
+
+ private:
+  std::map<std::string, std::pair<std::vector<std::uint64_t>, std::string>> plans_;
+};
+
+// A worker that does what cluster.proto asks of it; the test says when what ends.
+class QueueWorker {
+ public:
+  QueueWorker(QueueCluster& cluster, std::string id, std::uint32_t threads = 2)
+      : cluster_(cluster) {
+    report_.worker = std::move(id);
+    report_.name = report_.worker;
+    report_.threads = threads;
+  }
+
+  void set_fingerprint(const core::Digest& fingerprint) { report_.fingerprint = fingerprint; }
+
+  // Reports all that it holds, asks for up to `free` attempts, and takes what it is given. Returns
+  // the first answer; where that is all about the past, the worker calls again at once.
+  Reply sync(std::uint32_t free = 0) {
+    const Reply reply = send(free);
+    receive(reply);
+    if (free > 0 && reply.assignments.empty() && !reply.acknowledged.empty()) {
+      receive(send(free));
+    }
+    return reply;
+  }
+
+  // The two halves of sync: an answer may be lost in between.
+  Reply send(std::uint32_t free) {
+    report_.free_attempts = free;
+    const Reply reply = cluster_.apply(report_).reply;
+    const bool has_news =
+        !reply.assignments.empty() || !reply.stop.empty() || !reply.acknowledged.empty();
+    // A call that waits is looked at again when something may have changed.
+    return has_news ? reply : cluster_.apply(report_).reply;
+  }
+  void receive(const Reply& reply) {
+    for (const AssignAction& assign : reply.assignments) {
+      if (!holds(assign.attempt)) {
+        held.push_back(assign);
+        report_.running.push_back({assign.job, assign.attempt, assign.token, 0});
+      }
+    }
+    for (const AttemptName& name : reply.acknowledged) {
+      std::erase_if(report_.completions,
+                    [&](const CompletionClaim& claim) { return claim.attempt == name.attempt; });
+    }
+    for (const AttemptName& name : reply.stop) {
+      forget(name.attempt);
+    }
+  }
+
+  // Ends its oldest attempt with the first `count` results (all: the default) after `work_ms`.
+  CompletionClaim& finish(std::uint64_t work_ms = 1000, std::uint64_t count = ~std::uint64_t{0}) {
+    const AssignAction assign = held.front();
+    CompletionClaim claim{assign.job, assign.attempt, assign.token, {}, {}, work_ms};
+    const JobState* const job = cluster_.queue.job(assign.job);
+    for (std::uint64_t i = 0; job != nullptr && i < std::min(count, assign.shards); ++i) {
+      for (const StageState& stage : job->stages) {
+        if (stage.name == assign.stage) {
+          const std::uint64_t shard = assign.first_shard + i;
+          claim.results.push_back({shard, QueueCluster::result_of(stage.digests[shard]), 1});
+        }
+      }
+    }
+    forget(assign.attempt);
+    report_.completions.push_back(std::move(claim));
+    return report_.completions.back();
+  }
+  void fail(const std::string& message, bool resource_short = false) {
+    const std::uint64_t shard = held.front().first_shard;
+    finish(1000, 0).failure = Failure{resource_short, shard, message};
+  }
+  void leave() {
+    report_.leaving = true;
+    sync();
+  }
+  [[nodiscard]] bool holds(std::uint64_t attempt) const {
+    for (const AssignAction& assign : held) {
+      if (assign.attempt == attempt) {
+        return true;
+      }
+    }
+    return false;
+  }
+  [[nodiscard]] bool has_unacknowledged() const { return !report_.completions.empty(); }
+
+  std::vector<AssignAction> held;
+
+ private:
+  void forget(std::uint64_t attempt) {
+    std::erase_if(held, [&](const AssignAction& assign) { return assign.attempt == attempt; });
+    std::erase_if(report_.running,
+                  [&](const RunningClaim& claim) { return claim.attempt == attempt; });
+  }
+
+  QueueCluster& cluster_;
+  ReportEvent report_;
+};
+
+}  // namespace weft::coordinator
