@@ -1,0 +1,175 @@
+// Rates of the precomputation's kernels on a 4/1 satin of full size, one thread:
+//   cmake --build build --target bench_transport && build/bin/bench_transport
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "core/random.h"
+#include "fabric/build.h"
+#include "fabric/description.h"
+#include "shading/fibre_bcsdf.h"
+#include "transport/pca.h"
+#include "transport/signed_distance.h"
+#include "transport/sphere.h"
+#include "transport/transfer.h"
+#include "transport/visibility.h"
+#include "transport/visibility_sg.h"
+
+namespace {
+
+using namespace weft;  // NOLINT(google-build-using-namespace)
+
+constexpr std::uint32_t kResolution = 128;
+constexpr float kFar = std::numeric_limits<float>::infinity();
+
+constexpr const char* kSatin = R"(
+  name: "bench" seed: 7
+  weave {
+    matrix { rows: "XXXX." rows: "XX.XX" rows: ".XXXX" rows: "XXX.X" rows: "X.XXX" }
+    ends_per_cm: 40 picks_per_cm: 40 warp_yarn: "y" weft_yarn: "y"
+  }
+  yarns {
+    name: "y" material: "m" plies: 2 fibres_per_ply: 60 yarn_radius_mm: 0.11
+    fibre_radius_mm: 0.006 ply_twist_per_cm: 6 fibre_twist_per_cm: -10
+  }
+  materials {
+    name: "m" c_r { r: 0.2 g: 0.2 b: 0.2 } c_tt { r: 0.6 g: 0.7 b: 0.8 }
+    beta_r_deg: 7 beta_tt_deg: 10 gamma_tt_deg: 25
+  }
+)";
+
+const fabric::Tile& satin() {
+  static const fabric::Tile tile =
+      fabric::build_tile(fabric::parse_description(kSatin, "bench.textproto", "."));
+  return tile;
+}
+
+const transport::Scene& scene() {
+  static const transport::Scene built(satin());
+  return built;
+}
+
+std::uint32_t some_segment(std::uint64_t i) {
+  return core::Random(1, 0, i).below(satin().segment_count());
+}
+
+void scene_build(benchmark::State& state) {
+  static_cast<void>(satin());
+  for (auto unused : state) {
+    const transport::Scene built(satin());
+    benchmark::DoNotOptimize(&built);
+  }
+  state.counters["segments"] = satin().segment_count();
+}
+BENCHMARK(scene_build)->Unit(benchmark::kMillisecond);
+
+template <bool kClosest>
+void rays(benchmark::State& state) {
+  static_cast<void>(scene());
+  std::uint32_t i = 0;
+  std::uint64_t hits = 0;
+  for (auto unused : state) {
+    const std::uint32_t segment = some_segment(i / 256);
+    core::Random random(2, i++);
+    const float u_z = random.uniform();
+    const glm::vec3 direction = transport::uniform_direction(u_z, random.uniform());
+    const glm::vec3 origin = satin().wrapped_midpoint(segment);
+    const transport::StrandCopy own = scene().own_copy(segment);
+    if constexpr (kClosest) {
+      hits += scene().closest(origin, direction, kFar, own) ? 1 : 0;
+    } else {
+      hits += scene().occluded(origin, direction, kFar, own) ? 1 : 0;
+    }
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(i));
+  state.counters["hit_share"] = static_cast<double>(hits) / i;
+}
+BENCHMARK(rays<true>)->Name("rays_closest");
+BENCHMARK(rays<false>)->Name("rays_occluded");
+
+void visibility(benchmark::State& state) {
+  static_cast<void>(scene());
+  std::uint64_t i = 0;
+  for (auto unused : state) {
+    benchmark::DoNotOptimize(transport::visibility_bits(scene(), some_segment(i++), kResolution));
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(i * kResolution * kResolution));
+}
+BENCHMARK(visibility)->Unit(benchmark::kMillisecond);
+
+std::vector<std::vector<std::uint8_t>> images(std::uint64_t count) {
+  std::vector<std::vector<std::uint8_t>> all;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    all.push_back(transport::visibility_bits(scene(), some_segment(i), kResolution));
+  }
+  return all;
+}
+
+void signed_distance(benchmark::State& state) {
+  const auto some = images(64);
+  std::size_t i = 0;
+  for (auto unused : state) {
+    benchmark::DoNotOptimize(transport::signed_distance(some[i++ % some.size()], kResolution));
+  }
+}
+BENCHMARK(signed_distance)->Unit(benchmark::kMicrosecond);
+
+void gaussian_weights(benchmark::State& state) {
+  const auto some = images(64);
+  const auto axes = transport::sg_axes(48, 1234);
+  std::size_t i = 0;
+  for (auto unused : state) {
+    benchmark::DoNotOptimize(transport::sg_weights(some[i++ % some.size()], kResolution, axes));
+  }
+}
+BENCHMARK(gaussian_weights)->Unit(benchmark::kMicrosecond);
+
+// Noise of a falling spectrum: what the images are does not change the time.
+void pca(benchmark::State& state) {
+  const auto count = static_cast<std::size_t>(state.range(0));
+  constexpr std::uint32_t kPixels = kResolution * kResolution;
+  std::vector<float> sample(count * kPixels);
+  for (std::size_t n = 0; n < count; ++n) {
+    core::Random random(5, static_cast<std::uint32_t>(n));
+    for (std::uint32_t p = 0; p < kPixels; ++p) {
+      sample[n * kPixels + p] = (random.uniform() - 0.5f) / (1 + 0.01f * static_cast<float>(p));
+    }
+  }
+  for (auto unused : state) {
+    benchmark::DoNotOptimize(transport::principal_components(sample, kPixels, 48, 1));
+  }
+}
+BENCHMARK(pca)->Arg(1024)->Arg(4096)->Unit(benchmark::kSecond)->Iterations(1);
+
+void paths(benchmark::State& state) {
+  shading::FibreMaterial material;
+  material.c_r = {0.2f, 0.2f, 0.2f};
+  material.c_tt = {0.6f, 0.7f, 0.8f};
+  material.beta_r = 0.12f;
+  material.beta_tt = 0.17f;
+  const std::vector<shading::FibreBcsdf> materials{shading::FibreBcsdf(material)};
+  std::vector<std::uint32_t> segments;
+  for (std::uint64_t i = 0; i < 64; ++i) {
+    segments.push_back(some_segment(0) + static_cast<std::uint32_t>(i) < satin().segment_count()
+                           ? some_segment(0) + static_cast<std::uint32_t>(i)
+                           : some_segment(0));
+  }
+  transport::TransferSettings settings;
+  settings.estimator =
+      state.range(0) == 0 ? transport::Estimator::kExit : transport::Estimator::kLight;
+  std::uint64_t first = 0;
+  for (auto unused : state) {
+    benchmark::DoNotOptimize(
+        transport::transfer_sums(scene(), materials, {0, segments, first, 1024}, settings));
+    first += 1024;
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(first));
+}
+BENCHMARK(paths)->ArgName("light")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+
+BENCHMARK_MAIN();
