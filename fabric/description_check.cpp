@@ -79,7 +79,7 @@ void check_yarn(const FieldChecker& check, const v1::Yarn& yarn,
   v1::Exemplar all_fibres;
   all_fibres.set_fibre_share(1);
   try {
-    (void)yarn_model(yarn, all_fibres);
+    (void)yarn_model(yarn, yarn.yarn_radius_mm(), all_fibres);
   } catch (const core::Error& error) {
     check.wrong("fibre_radius_mm", error.what());
   }
