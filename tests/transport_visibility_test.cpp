@@ -11,6 +11,7 @@
 #include "transport/signed_distance.h"
 #include "transport/sphere.h"
 #include "transport/visibility.h"
+#include "transport/visibility_raster.h"
 #include "transport/visibility_sg.h"
 
 namespace weft::transport {
@@ -124,6 +125,63 @@ TEST(TransportVisibility, Bits_AreWhatRaysSay) {
   }
   EXPECT_GT(visible, 100u);
   EXPECT_LE(different, 1u);  // a ray that grazes a fibre within rounding
+}
+
+// Rays and the raster must see the same, but for rays that graze a fibre within rounding.
+void compare_raster_with_rays(const fabric::Tile& tile, std::uint32_t step) {
+  const Scene scene(tile);
+  const VisibilityRaster raster(scene);
+  constexpr std::uint32_t kResolution = 64;
+  std::uint32_t different = 0;
+  std::uint32_t visible = 0;
+  std::uint32_t pixels = 0;
+  for (std::uint32_t k = 0; k < tile.segment_count(); k += step) {
+    const auto by_rays = visibility_bits(scene, k, kResolution);
+    const auto by_raster = raster.bits(k, kResolution);
+    ASSERT_EQ(by_rays.size(), by_raster.size());
+    for (std::uint32_t p = 0; p < kResolution * kResolution; ++p, ++pixels) {
+      different += is_visible(by_rays, p) != is_visible(by_raster, p) ? 1 : 0;
+      visible += is_visible(by_rays, p) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(visible, pixels / 100);
+  EXPECT_LT(visible, pixels - pixels / 100);
+  EXPECT_LE(different, pixels / 50000);
+}
+
+TEST(TransportVisibilityRaster, SeesWhatRaysSeeInCrossedLayers) {
+  compare_raster_with_rays(test::crossed_layers(4, 8, 0.02f, 6), 7);
+}
+
+TEST(TransportVisibilityRaster, SeesWhatRaysSeeInHairs) {
+  compare_raster_with_rays(test::random_hairs(300, 0.4f, 0.3f, 0.15f, 21), 47);
+}
+
+TEST(TransportVisibilityRaster, SeesWhatRaysSeeInSparseCloth) {
+  compare_raster_with_rays(test::random_hairs(40, 1.0f, 0.7f, 0.4f, 22), 17);
+}
+
+TEST(TransportVisibilityRaster, SeesWhatRaysSeeInATileSmallerThanItsFibres) {
+  compare_raster_with_rays(test::random_hairs(8, 0.08f, 0.05f, 0.6f, 5), 3);
+}
+
+TEST(TransportVisibilityRaster, SeesWhatRaysSeeWhereSegmentsAreLong) {
+  compare_raster_with_rays(test::crossed_layers(6, 5, 0.015f, 1), 2);
+}
+
+TEST(TransportVisibilityRaster, AnyResolutionThatIsAMultipleOfEight_Works) {
+  const fabric::Tile tile = test::crossed_layers(4, 8, 0.02f, 6);
+  const Scene scene(tile);
+  const VisibilityRaster raster(scene);
+  for (const std::uint32_t resolution : {8u, 24u, 72u, 200u}) {
+    const auto by_rays = visibility_bits(scene, 5, resolution);
+    const auto by_raster = raster.bits(5, resolution);
+    std::uint32_t different = 0;
+    for (std::uint32_t p = 0; p < resolution * resolution; ++p) {
+      different += is_visible(by_rays, p) != is_visible(by_raster, p) ? 1 : 0;
+    }
+    EXPECT_LE(different, 1u) << resolution;
+  }
 }
 
 TEST(TransportVisibilitySg, Weights_SumToTheVisibleHemisphere) {
