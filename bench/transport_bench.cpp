@@ -16,6 +16,7 @@
 #include "transport/sphere.h"
 #include "transport/transfer.h"
 #include "transport/visibility.h"
+#include "transport/visibility_raster.h"
 #include "transport/visibility_sg.h"
 
 namespace {
@@ -90,7 +91,7 @@ void rays(benchmark::State& state) {
 BENCHMARK(rays<true>)->Name("rays_closest");
 BENCHMARK(rays<false>)->Name("rays_occluded");
 
-void visibility(benchmark::State& state) {
+void visibility_rays(benchmark::State& state) {
   static_cast<void>(scene());
   std::uint64_t i = 0;
   for (auto unused : state) {
@@ -98,12 +99,27 @@ void visibility(benchmark::State& state) {
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(i * kResolution * kResolution));
 }
-BENCHMARK(visibility)->Unit(benchmark::kMillisecond);
+BENCHMARK(visibility_rays)->Unit(benchmark::kMillisecond);
+
+const transport::VisibilityRaster& raster() {
+  static const transport::VisibilityRaster built(scene());
+  return built;
+}
+
+void visibility_raster(benchmark::State& state) {
+  static_cast<void>(raster());
+  std::uint64_t i = 0;
+  for (auto unused : state) {
+    benchmark::DoNotOptimize(raster().bits(some_segment(i++), kResolution));
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(i * kResolution * kResolution));
+}
+BENCHMARK(visibility_raster)->Unit(benchmark::kMillisecond);
 
 std::vector<std::vector<std::uint8_t>> images(std::uint64_t count) {
   std::vector<std::vector<std::uint8_t>> all;
   for (std::uint64_t i = 0; i < count; ++i) {
-    all.push_back(transport::visibility_bits(scene(), some_segment(i), kResolution));
+    all.push_back(raster().bits(some_segment(i), kResolution));
   }
   return all;
 }

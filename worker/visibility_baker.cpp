@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "proto/arrays.h"
-#include "transport/visibility.h"
+#include "transport/visibility_raster.h"
 #include "worker/bakers.h"
 
 namespace weft::worker {
@@ -16,6 +16,7 @@ class VisibilityBaker : public Baker {
     require_inputs(context, "visibility", 1);
     require_resolution(resolution_, "visibility");
     input_ = std::make_unique<TileScene>(context.inputs[0]);
+    raster_ = std::make_unique<transport::VisibilityRaster>(input_->scene);
   }
 
   std::string bake(std::uint64_t shard, const std::string& /*shard_input*/,
@@ -24,8 +25,8 @@ class VisibilityBaker : public Baker {
     std::vector<std::uint8_t> bits;
     std::uint64_t count = 0;
     for (std::uint64_t k = shard; k < input_->tile.segment_count(); k += shard_count_, ++count) {
-      const std::vector<std::uint8_t> image = transport::visibility_bits(
-          input_->scene, static_cast<std::uint32_t>(k), resolution_, stop_point(should_stop));
+      const std::vector<std::uint8_t> image =
+          raster_->bits(static_cast<std::uint32_t>(k), resolution_, stop_point(should_stop));
       bits.insert(bits.end(), image.begin(), image.end());
     }
     v1::Arrays arrays;
@@ -38,6 +39,7 @@ class VisibilityBaker : public Baker {
   std::uint32_t resolution_;
   std::uint64_t shard_count_;
   std::unique_ptr<TileScene> input_;
+  std::unique_ptr<transport::VisibilityRaster> raster_;  // reads input_
 };
 
 }  // namespace
