@@ -116,7 +116,7 @@ ShadingPoint PrecomputedFabric::point(std::uint32_t segment, glm::vec3 tangent,
   const shading::ShRotation to_flat = shading::sh_rotation(glm::transpose(at.to_fibre));
   for (std::size_t channel = 0; channel < 3; ++channel) {
     const std::size_t row =
-        (material_of_segment_[segment] * 3 + channel) * shading::kBcsdfShAngles + i;
+        (std::size_t{material_of_segment_[segment]} * 3 + channel) * shading::kBcsdfShAngles + i;
     const float* low = db_.c_s.data() + row * n;
     shading::ShVector c = shading::sh_zero();
     for (std::size_t j = 0; j < n; ++j) {

@@ -49,16 +49,22 @@ struct LobePair {
   vec3 tt;
 };
 
+// exp(-(theta_i + theta_o)^2 / (2 beta^2)) for R and TT.
+SHARED vec2 lobe_gaussians(FibreLobes lobes, float theta_i, float theta_o) {
+  float d = theta_i + theta_o;
+  float half_d2 = 0.5f * d * d;
+  return vec2(exp(-half_d2 * lobes.precision_r), exp(-half_d2 * lobes.precision_tt));
+}
+
 // From M_beta(theta_i, theta_o) = N(theta_o; -theta_i, beta) / G(theta_i; beta):
 //   S_R  = F M_R / (2 pi)
 //   S_TT = (1 - F) C_TT M_TT exp(-kappa (1 + cos phi)) / (2 pi I0e(kappa)),
 // phi = phi_i - phi_o; light that goes straight on has phi = pi, both directions pointing outward.
-SHARED LobePair bcsdf_lobes(FibreLobes lobes, FibreAngle i, FibreAngle o, float cos_phi) {
+// `gaussians` are lobe_gaussians of the two longitudes.
+SHARED LobePair bcsdf_lobes(FibreLobes lobes, FibreAngle i, vec2 gaussians, float cos_phi) {
   vec2 norm = lobe_norm(lobes, i.pole);
-  float d = i.theta + o.theta;
-  float half_d2 = 0.5f * d * d;
-  float m_r = exp(-half_d2 * lobes.precision_r) / norm.x;
-  float m_tt = exp(-half_d2 * lobes.precision_tt - lobes.kappa_tt * (1.0f + cos_phi)) / norm.y;
+  float m_r = gaussians.x / norm.x;
+  float m_tt = gaussians.y * exp(-lobes.kappa_tt * (1.0f + cos_phi)) / norm.y;
   vec3 f = fresnel(lobes.c_r, i.cos_theta);
   LobePair s;
   s.r = f * (m_r * (1.0f / kTwoPi));
@@ -70,7 +76,8 @@ SHARED LobePair bcsdf_lobes(FibreLobes lobes, FibreAngle i, FibreAngle o, float 
 SHARED vec3 bcsdf(FibreLobes lobes, vec3 omega_i, vec3 omega_o) {
   FibreAngle i = fibre_angle(omega_i);
   FibreAngle o = fibre_angle(omega_o);
-  LobePair s = bcsdf_lobes(lobes, i, o, cos_phi_between(omega_i, i, omega_o, o));
+  vec2 gaussians = lobe_gaussians(lobes, i.theta, o.theta);
+  LobePair s = bcsdf_lobes(lobes, i, gaussians, cos_phi_between(omega_i, i, omega_o, o));
   return s.r + s.tt;
 }
 

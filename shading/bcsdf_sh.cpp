@@ -40,12 +40,14 @@ ShDouble evaluate_sh(double x, double y, double z) {
         before = value;
         value = next;
       }
-      const auto j = static_cast<std::size_t>(l * (l + 1));
+      const auto order = static_cast<std::size_t>(l);
+      const auto step = static_cast<std::size_t>(m);
+      const std::size_t j = order * (order + 1);
       if (m == 0) {
         out[j] = value;
       } else {
-        out[j + static_cast<std::size_t>(m)] = std::numbers::sqrt2 * value * c;
-        out[j - static_cast<std::size_t>(m)] = std::numbers::sqrt2 * value * s;
+        out[j + step] = std::numbers::sqrt2 * value * c;
+        out[j - step] = std::numbers::sqrt2 * value * s;
       }
     }
   }
@@ -126,8 +128,9 @@ BcsdfSh bcsdf_sh(const FibreMaterial& material, double theta_o) {
 }
 
 std::vector<float> bcsdf_sh_table(const FibreMaterial& material, int order) {
-  const auto count = static_cast<std::size_t>((order + 1) * (order + 1));
-  std::vector<float> table(3 * kBcsdfShAngles * count);
+  const std::size_t side = static_cast<std::size_t>(order) + 1;
+  const std::size_t count = side * side;
+  std::vector<float> table(std::size_t{3} * kBcsdfShAngles * count);
   for (std::size_t i = 0; i < kBcsdfShAngles; ++i) {
     const double theta_o =
         -kHalfPiExact + std::numbers::pi * static_cast<double>(i) / (kBcsdfShAngles - 1);

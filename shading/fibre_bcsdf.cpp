@@ -100,7 +100,7 @@ struct FibreBcsdf::Tables {
 
   [[nodiscard]] Row row(float pole) const;
   // The density that sample() draws from, times cos(theta_i).
-  [[nodiscard]] float density_cos(const Row& row, float theta_sum, float azimuth_density) const;
+  [[nodiscard]] float density_cos(const Row& row, glm::vec2 gaussians, float azimuth_density) const;
 };
 
 FibreBcsdf::Tables::Tables(const FibreMaterial& m)
@@ -160,10 +160,10 @@ Row FibreBcsdf::Tables::row(float pole) const {
           mix_floats(a.schlick_tt, b.schlick_tt, f)};
 }
 
-float FibreBcsdf::Tables::density_cos(const Row& at, float theta_sum, float azimuth_density) const {
-  const float half_d2 = 0.5f * theta_sum * theta_sum;
-  const float r = peak_r * std::exp(-half_d2 * lobes.precision_r) / (1 - at.r.low - at.r.high);
-  const float tt = peak_tt * std::exp(-half_d2 * lobes.precision_tt) / (1 - at.tt.low - at.tt.high);
+float FibreBcsdf::Tables::density_cos(const Row& at, glm::vec2 gaussians,
+                                      float azimuth_density) const {
+  const float r = peak_r * gaussians.x / (1 - at.r.low - at.r.high);
+  const float tt = peak_tt * gaussians.y / (1 - at.tt.low - at.tt.high);
   return at.share_r * r * (1 / kTwoPi) + (1 - at.share_r) * tt * azimuth_density;
 }
 
@@ -213,9 +213,9 @@ BcsdfSample FibreBcsdf::sample(glm::vec3 omega_o, float u_lobe, float u_theta, f
   FibreAngle i;
   i.theta = sample_theta(reflect ? row.r : row.tt, reflect ? t.material.beta_r : t.material.beta_tt,
                          o.theta, u_theta);
-  i.pole = std::max(kHalfPi - std::abs(i.theta), kCosineFloor);
-  i.sin_theta = std::sin(i.theta);
-  i.cos_theta = std::sin(i.pole);
+  i.pole = kHalfPi - std::abs(i.theta);
+  i.sin_theta = sin_quarter(i.theta);
+  i.cos_theta = std::max(sin_quarter(i.pole), kCosineFloor);
   float v;  // phi_i - phi_o - pi
   float azimuth_density;
   if (reflect) {
@@ -226,12 +226,12 @@ BcsdfSample FibreBcsdf::sample(glm::vec3 omega_o, float u_lobe, float u_theta, f
     v = drawn.v;
     azimuth_density = drawn.density;
   }
-  const float cos_v = std::cos(v);
-  const float sin_v = std::sin(v);
-  result.omega_i = {i.sin_theta, i.cos_theta * (sin_v * axis.y - cos_v * axis.x),
-                    -i.cos_theta * (sin_v * axis.x + cos_v * axis.y)};
-  const LobePair s = bcsdf_lobes(t.lobes, i, o, -cos_v);
-  const float density = t.density_cos(row, i.theta + o.theta, azimuth_density);
+  const glm::vec2 turn = cos_sin_half(v);
+  result.omega_i = {i.sin_theta, i.cos_theta * (turn.y * axis.y - turn.x * axis.x),
+                    -i.cos_theta * (turn.y * axis.x + turn.x * axis.y)};
+  const glm::vec2 gaussians = lobe_gaussians(t.lobes, i.theta, o.theta);
+  const LobePair s = bcsdf_lobes(t.lobes, i, gaussians, -turn.x);
+  const float density = t.density_cos(row, gaussians, azimuth_density);
   if (!(density > 0)) {
     return result;
   }
@@ -254,7 +254,9 @@ float FibreBcsdf::pdf(glm::vec3 omega_i, glm::vec3 omega_o) const {
   const float c = std::sqrt(0.5f * (1 - cos_phi));
   const float v = s < c ? 2 * asin_acute(std::min(s, 0.70710678f))
                         : kPi - 2 * asin_acute(std::min(c, 0.70710678f));
-  return t.density_cos(t.row(o.pole), i.theta + o.theta, t.azimuth.density(v)) / cos_theta_i;
+  return t.density_cos(t.row(o.pole), lobe_gaussians(t.lobes, i.theta, o.theta),
+                       t.azimuth.density(v)) /
+         cos_theta_i;
 }
 
 glm::vec3 FibreBcsdf::adjoint_albedo(float theta_o) const {

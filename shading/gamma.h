@@ -31,13 +31,13 @@ struct GammaLight {
 };
 
 SHARED vec3 gamma_factor_r(FibreLobes lobes, GammaLight light, float theta) {
-  float c = max(0.0f, cos(theta));
+  float c = max(0.0f, sin_quarter(kHalfPi - abs(theta)));
   float rho = c * c / lobe_norm(lobes, kHalfPi - abs(theta)).x;
   return fresnel(lobes.c_r, c) * (rho * bessel_i0e(light.lambda * light.cos_theta * c));
 }
 
 SHARED vec3 gamma_factor_tt(FibreLobes lobes, GammaLight light, float theta) {
-  float c = max(0.0f, cos(theta));
+  float c = max(0.0f, sin_quarter(kHalfPi - abs(theta)));
   float rho = c * c / lobe_norm(lobes, kHalfPi - abs(theta)).y;
   float k = light.lambda * light.cos_theta * c;
   float kappa = lobes.kappa_tt;
@@ -128,7 +128,7 @@ SHARED vec3 gamma_lobe_gl12(FibreLobes lobes, GammaLight light, GammaPeak peak, 
   for (int k = 0; k < 12; ++k) {
     Gl12Node node = gl12_node(k);
     float theta = middle + half_width * node.x;
-    float half_sine = sin(0.5f * (theta - light.theta));
+    float half_sine = sin_quarter(0.5f * (theta - light.theta));
     float d = theta + theta_o;
     float e = -2.0f * light.lambda * half_sine * half_sine - 0.5f * b * d * d;
     sum += gamma_factor(lobes, light, theta, transmission) * (node.weight * exp(e));

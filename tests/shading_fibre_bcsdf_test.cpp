@@ -29,7 +29,9 @@ TEST(FibreBcsdf, HasTheReferenceValuesOfBothLobes) {
     const glm::vec3 omega_o = fibre_direction(v.theta_o, 0.7);
     const FibreAngle i = fibre_angle(omega_i);
     const FibreAngle o = fibre_angle(omega_o);
-    const LobePair s = bcsdf_lobes(bcsdf.lobes(), i, o, cos_phi_between(omega_i, i, omega_o, o));
+    const LobePair s =
+        bcsdf_lobes(bcsdf.lobes(), i, lobe_gaussians(bcsdf.lobes(), i.theta, o.theta),
+                    cos_phi_between(omega_i, i, omega_o, o));
     // Directions are floats: an angle is good to 1e-7, which the exponents multiply by the
     // lobes' steepness |theta_i + theta_o| / beta^2 and kappa; the table adds 3e-5.
     const double d = std::abs(v.theta_i + v.theta_o);
