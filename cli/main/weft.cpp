@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   // One line per command, in the order of commands.h.
   cli::add_preview(app);
   cli::add_run(app);
+  cli::add_up(app);
   cli::add_submit(app);
   cli::add_jobs(app);
   cli::add_watch(app);
