@@ -37,6 +37,11 @@ struct YarnModel {
 [[nodiscard]] YarnModel yarn_model(const v1::Yarn& yarn, double yarn_radius_mm,
                                    const v1::Exemplar& exemplar);
 
+// The same at the yarn's own radius.
+[[nodiscard]] inline YarnModel yarn_model(const v1::Yarn& yarn, const v1::Exemplar& exemplar) {
+  return yarn_model(yarn, yarn.yarn_radius_mm(), exemplar);
+}
+
 // Circles of equal size fill at most pi / (2 sqrt(3)) of the plane.
 inline constexpr double kDensestPacking = 0.9069;
 
