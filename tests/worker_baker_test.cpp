@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/half.h"
+#include "fabric/description.h"
 #include "proto/arrays.h"
 #include "tests/transport_tiles.h"
 #include "worker/baker.h"
@@ -85,6 +86,20 @@ BakerContext transfer_context(v1::TransferEstimator estimator = v1::TRANSFER_EST
   context.shard_count = shape[0] * 3;
   context.inputs = {grid_context().inputs[0], grid};
   return context;
+}
+
+TEST(WorkerBaker, Geometry_IsTheTileOfItsDescription) {
+  BakerContext context;
+  *context.spec.mutable_geometry()->mutable_description() =
+      fabric::geometry_part(fabric::load_description(WEFT_SOURCE_DIR "/examples/tiny.textproto"));
+  context.shard_count = 1;
+  const std::string result = bake(context, 0);
+  EXPECT_EQ(result, bake(context, 0));
+  const fabric::Tile tile = fabric::decode_tile(result);
+  EXPECT_GT(tile.segment_count(), 0u);
+  EXPECT_EQ(tile.threads.size(), 4u);
+  context.inputs = {"something"};
+  EXPECT_THROW(static_cast<void>(make_baker(context)), core::Error);
 }
 
 TEST(WorkerBaker, Grid_HasWhatItsSpecPromises) {

@@ -7,8 +7,10 @@
 #include "core/random.h"
 #include "shading/fibre_bcsdf.h"
 #include "transport/pca.h"
+#include "transport/signed_distance.h"
 #include "transport/sphere.h"
 #include "transport/transfer.h"
+#include "transport/visibility_raster.h"
 #include "worker/baker.h"
 
 namespace weft::worker {
@@ -68,6 +70,14 @@ void probe_rays(core::Hasher& hasher, const transport::Scene& scene) {
                                    std::numeric_limits<float>::infinity(), scene.own_copy(segment));
     add(hasher, hit ? hit->t_mm : -1.0f);
     hasher.number(hit ? hit->segment : 0);
+  }
+  const transport::VisibilityRaster raster(scene);
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    const std::vector<std::uint8_t> bits = raster.bits(k, 64);
+    hasher.bytes({reinterpret_cast<const char*>(bits.data()), bits.size()});
+    for (const float distance : transport::signed_distance(bits, 64)) {
+      add(hasher, distance);
+    }
   }
 }
 
