@@ -9,10 +9,10 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/fibre_colours.h"
 #include "cli/progress.h"
 #include "cli/quality.h"
 #include "cli/tile_picture.h"
@@ -40,23 +40,6 @@ struct PreviewOptions {
   bool json = false;
 };
 
-// What the cloth looks like from afar has no part in a preview: the material's whole albedo does.
-std::vector<glm::vec3> display_colours(const v1::FabricDescription& description,
-                                       const fabric::Tile& tile) {
-  std::vector<glm::vec3> colours(tile.material_names.size(), glm::vec3(0.6F));
-  for (std::size_t m = 0; m < colours.size(); ++m) {
-    for (const v1::Material& material : description.materials()) {
-      if (material.name() == tile.material_names[m]) {
-        const glm::dvec3 albedo{material.c_r().r() + material.c_tt().r(),
-                                material.c_r().g() + material.c_tt().g(),
-                                material.c_r().b() + material.c_tt().b()};
-        colours[m] = glm::vec3(glm::min(albedo, glm::dvec3(1)));
-      }
-    }
-  }
-  return colours;
-}
-
 double shown_width_mm(const PreviewOptions& options, const fabric::Tile& tile) {
   if (options.width_mm > 0) {
     return options.width_mm;
@@ -74,7 +57,7 @@ void draw(const PreviewOptions& options, const v1::FabricDescription& descriptio
   PictureView view;
   view.width = view.height = options.pixels;
   view.width_mm = shown_width_mm(options, tile);
-  const std::vector<glm::vec3> colours = display_colours(description, tile);
+  const std::vector<glm::vec3> colours = fibre_colours(description, tile);
   std::vector<std::vector<std::uint8_t>> pictures;
   if (options.view != "oblique") {
     pictures.push_back(draw_tile(tile, colours, view));

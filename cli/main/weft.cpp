@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "weft 0.1.0");
   // One line per command, in the order of commands.h.
   cli::add_preview(app);
+  cli::add_export(app);
   cli::add_run(app);
   cli::add_up(app);
   cli::add_submit(app);
