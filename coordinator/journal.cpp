@@ -429,12 +429,13 @@ std::vector<std::optional<core::Digest>> Journal::results_of(std::span<const cor
   return results;
 }
 
-void Journal::forget_result(const core::Digest& result) {
+std::uint64_t Journal::forget_result(const core::Digest& result) {
   wait(append({}));
   const std::lock_guard lock(state_->connection_mutex);
   Statement(state_->connection, "DELETE FROM results WHERE result = ?")
       .blob(result.binary())
       .step();
+  return static_cast<std::uint64_t>(sqlite3_changes64(state_->connection.handle()));
 }
 
 std::vector<FailureRecord> Journal::failures_of(const std::string& job, StageName stage) {

@@ -82,8 +82,8 @@ class Journal {
   // The result of each shard's work, where known.
   [[nodiscard]] std::vector<std::optional<core::Digest>> results_of(
       std::span<const core::Digest> shards);
-  // Forgets all shards whose result this is.
-  void forget_result(const core::Digest& result);
+  // Forgets all shards whose result this is, and says how many.
+  std::uint64_t forget_result(const core::Digest& result);
   [[nodiscard]] std::vector<FailureRecord> failures_of(const std::string& job, StageName stage);
 
   // Puts a version into the catalogue; durable on return. Throws core::Error(kAlreadyExists) when

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -77,8 +78,10 @@ void Scheduler::report(const Event& event) {
     check_running();
     const auto* const lost = std::get_if<ResultLostEvent>(&event);
     if (lost != nullptr) {
-      spdlog::warn("result={} event=lost", lost->result.hex());
-      journal_.forget_result(lost->result);
+      const std::uint64_t shards = journal_.forget_result(lost->result);
+      if (shards > 0) {
+        spdlog::warn("result={} event=lost shards={}", lost->result.hex(), shards);
+      }
     }
     apply(event, nullptr);
   } catch (const core::Error& error) {
@@ -256,14 +259,15 @@ std::optional<v1::SynchronizeResponse> Scheduler::synchronize(
     const Journal::Ticket ticket = apply(report, &reply);
     const bool has_news =
         !reply.assignments.empty() || !reply.stop.empty() || !reply.acknowledged.empty();
-    if (has_news || report.leaving || clock_.now() >= deadline) {
+    const Time now = clock_.now();
+    if (has_news || report.leaving || now >= deadline) {
       v1::SynchronizeResponse response = message(reply);
       lock.unlock();
       journal_.wait(ticket);
       return response;
     }
     // Back-offs and retries become due without an event, so look again now and then.
-    changed_.wait_for(lock, std::chrono::seconds(1), [&] {
+    changed_.wait_for(lock, std::min(std::chrono::milliseconds(1000), deadline - now), [&] {
       return stopping_ || wakes_ != wakes || sequences_[report.worker] != sequence;
     });
     check_running();

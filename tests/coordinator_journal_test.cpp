@@ -187,7 +187,8 @@ TEST_F(JournalTest, ForgottenResult_IsUnknownForAllItsShards) {
   ResultRecord same = result(2);
   same.result = result(1).result;
   journal.append({result(1), same, result(3)});
-  journal.forget_result(result(1).result);
+  EXPECT_EQ(journal.forget_result(result(1).result), 2U);
+  EXPECT_EQ(journal.forget_result(result(1).result), 0U);
   EXPECT_EQ(known_results(journal, 4), 1);
 }
 
