@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   cli::add_inspect(app);
   cli::add_verify(app);
   cli::add_render(app);
+  cli::add_compare(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
