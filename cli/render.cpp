@@ -269,6 +269,9 @@ void run(const RenderOptions& options) {
       precomputed ? render::Fabric::Wanted::kFibresAndTransfer : render::Fabric::Wanted::kFibres);
   const render::Scene scene = render::build_scene(
       described, [&](const std::string& reference) { return shelf.take(reference).fabric; });
+  for (const std::string& remark : scene.remarks) {
+    fmt::print(stderr, "weft: {}\n", remark);
+  }
   const std::unique_ptr<render::Integrator> integrator = integrator_for(described, scene);
   const double load_seconds = loading.seconds();
 

@@ -12,6 +12,7 @@
 #include "render/flat_cloth.h"
 #include "render/image.h"
 #include "render/scene_description.h"
+#include "render/shell_cloth.h"
 #include "render/sphere_sampling.h"
 
 namespace weft::render {
@@ -77,7 +78,7 @@ double swatch_size(double size_mm, double tiles, double tile_mm) {
   return tile_mm * (tiles > 0 ? tiles : std::ceil(kDefaultSwatchMm / tile_mm));
 }
 
-std::unique_ptr<Cloth> cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric) {
+std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric) {
   const v1::FlatSwatch& flat = cloth.flat();
   const glm::dvec2 tile_mm(fabric->tile().size_mm);
   FlatPlacement placement;
@@ -88,6 +89,23 @@ std::unique_ptr<Cloth> cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fa
   placement.centre_mm = {flat.centre_x_mm(), flat.centre_y_mm(), flat.centre_z_mm()};
   placement.black_underlay = cloth.black_underlay();
   return make_flat_cloth(std::move(fabric), placement);
+}
+
+std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric,
+                                      std::vector<std::string>& remarks) {
+  const v1::ShellMesh& shell = cloth.shell();
+  ObjMesh mesh = read_obj(shell.obj_file());
+  const double scale_mm = shell.mesh_scale_mm() > 0 ? shell.mesh_scale_mm() : 1;
+  for (glm::dvec3& point : mesh.points) {
+    const glm::dvec3 upright = shell.y_up() ? glm::dvec3(point.x, -point.z, point.y) : point;
+    point = scale_mm * upright + vector_of(shell.move_mm());
+  }
+  ShellPlacement placement;
+  placement.texture_mm = {shell.texture_width_mm(), shell.texture_height_mm()};
+  placement.thickness_mm = shell.thickness_mm();
+  placement.flip_normals = shell.flip_normals();
+  placement.black_underlay = cloth.black_underlay();
+  return make_shell_cloth(std::move(fabric), mesh, placement, remarks);
 }
 
 Cloth::Bounds bounds_of(const std::vector<std::unique_ptr<Cloth>>& cloths) {
@@ -169,7 +187,10 @@ Scene build_scene(const v1::Scene& description, const FabricSource& fabrics) {
     scene.lights.push_back(light_of(light, whole.cut_lights_at_horizon()));
   }
   for (const v1::Cloth& cloth : whole.cloths()) {
-    scene.cloths.push_back(cloth_of(cloth, fabrics(cloth.fabric())));
+    std::shared_ptr<const Fabric> fabric = fabrics(cloth.fabric());
+    scene.cloths.push_back(cloth.has_shell()
+                               ? shell_cloth_of(cloth, std::move(fabric), scene.remarks)
+                               : flat_cloth_of(cloth, std::move(fabric)));
   }
   scene.camera = camera_of(whole, bounds_of(scene.cloths));
   scene.background = colour_or(true, whole.picture().background(), 0);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -19,7 +20,8 @@ struct Scene {
   Camera camera;
   std::vector<Light> lights;
   std::vector<std::unique_ptr<Cloth>> cloths;
-  glm::vec3 background{0, 0, 0};  // seen where nothing is hit; it lights nothing
+  glm::vec3 background{0, 0, 0};     // seen where nothing is hit; it lights nothing
+  std::vector<std::string> remarks;  // what a person should know about it
 };
 
 // A hit on one of the scene's pieces of cloth.

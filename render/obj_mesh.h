@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+namespace weft::render {
+
+// A triangle mesh with texture coordinates at the triangles' corners, so that one point may have
+// several.
+struct ObjMesh {
+  struct Triangle {
+    std::array<std::uint32_t, 3> points;
+    std::array<glm::dvec2, 3> texture;
+  };
+  std::vector<glm::dvec3> points;
+  std::vector<Triangle> triangles;
+};
+
+inline constexpr std::size_t kTriangleLimit = 4'000'000;
+
+// Reads a Wavefront OBJ file; polygons are cut into triangles, triangles without area left out.
+// Throws core::Error: kNotFound when there is no such file, kInvalidArgument when it is no OBJ
+// file, a corner lacks texture coordinates, a number is not finite or there is no triangle, and
+// kResourceExhausted above kTriangleLimit.
+[[nodiscard]] ObjMesh read_obj(const std::filesystem::path& path);
+
+}  // namespace weft::render
