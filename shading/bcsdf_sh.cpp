@@ -107,6 +107,13 @@ LobeSh lobe_sh(double theta_o, double beta, double kappa) {
   return sum;
 }
 
+// Whether Y_j(-x, y, z) = -Y_j(x, y, z): cos(m phi) for odd m, sin(m phi) for even m.
+bool odd_in_x(std::size_t j) {
+  const auto l = static_cast<int>(std::sqrt(static_cast<double>(j)));
+  const int m = static_cast<int>(j) - l * (l + 1);
+  return m > 0 ? m % 2 == 1 : m < 0 && m % 2 == 0;
+}
+
 }  // namespace
 
 BcsdfSh bcsdf_sh(const FibreMaterial& material, double theta_o) {
@@ -131,13 +138,17 @@ std::vector<float> bcsdf_sh_table(const FibreMaterial& material, int order) {
   const std::size_t side = static_cast<std::size_t>(order) + 1;
   const std::size_t count = side * side;
   std::vector<float> table(std::size_t{3} * kBcsdfShAngles * count);
-  for (std::size_t i = 0; i < kBcsdfShAngles; ++i) {
+  // Only half of the angles: mirroring the fibre in x turns theta_o into -theta_o.
+  for (std::size_t i = 0; i < kBcsdfShAngles / 2; ++i) {
     const double theta_o =
         -kHalfPiExact + std::numbers::pi * static_cast<double>(i) / (kBcsdfShAngles - 1);
+    const std::size_t mirrored = kBcsdfShAngles - 1 - i;
     const BcsdfSh c = bcsdf_sh(material, theta_o);
     for (std::size_t channel = 0; channel < 3; ++channel) {
       for (std::size_t j = 0; j < count; ++j) {
-        table[(channel * kBcsdfShAngles + i) * count + j] = static_cast<float>(c[channel][j]);
+        const auto value = static_cast<float>(c[channel][j]);
+        table[(channel * kBcsdfShAngles + i) * count + j] = value;
+        table[(channel * kBcsdfShAngles + mirrored) * count + j] = odd_in_x(j) ? -value : value;
       }
     }
   }

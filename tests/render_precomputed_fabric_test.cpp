@@ -58,6 +58,7 @@ std::vector<std::uint16_t> sg_weights(int count, float turn,
     weights[static_cast<std::size_t>(best)] += shading::map_solid_angle(row, kResolution);
   }
   std::vector<std::uint16_t> halves;
+  halves.reserve(weights.size());
   for (const float w : weights) {
     halves.push_back(core::half_from_float(w));
   }
@@ -77,7 +78,7 @@ storage::FabricDatabase synthetic(const shading::FibreMaterial& material, int sg
   db.cell_of_segment = {0, 1, 1};
   db.sh_order = shading::kShMaxOrder;
   db.cell_paths = {1, 1};
-  db.transfer.assign(2 * 3 * kShCount * kShCount, 0.0f);
+  db.transfer.assign(std::size_t{2} * 3 * kShCount * kShCount, 0.0f);
   db.visibility_resolution = kResolution;
   db.pca_components = 2;
   for (int pixel = 0; pixel < kResolution * kResolution; ++pixel) {
@@ -238,7 +239,7 @@ TEST(PrecomputedFabric, SumOfGaussiansMatchesTheReference) {
     db.ssg_rotation[kHalfSpace] = 0;
     for (int q = 0; q < 48; ++q) {
       const bool open = shading::fibonacci_axis(q, 48, 0).x > -0.2f;
-      db.ssg[kHalfSpace * 48 + static_cast<std::size_t>(q)] =
+      db.ssg[std::size_t{kHalfSpace} * 48 + static_cast<std::size_t>(q)] =
           core::half_from_float(open ? shading::kTwoPi / 48 : 0.0f);
     }
     PrecomputedSettings settings;
@@ -317,16 +318,20 @@ TEST(PrecomputedFabric, LightFromBelowTheHorizonCountsNothing) {
               1e-5f * fabric().unoccluded_sg(at, level).y);
 }
 
+void expect_finite_shading(const ShadingPoint& at, glm::vec3 towards) {
+  EXPECT_TRUE(std::isfinite(fabric().single_directional(at, towards).y));
+  for (const float sharpness : {0.0f, 1.0f, 150.0f, 1e5f}) {
+    EXPECT_TRUE(std::isfinite(fabric().single_sg(at, {towards, sharpness}).y)) << sharpness;
+    EXPECT_TRUE(std::isfinite(harmonics_of_sg({towards, sharpness}).c[35])) << sharpness;
+  }
+}
+
 TEST(PrecomputedFabric, HoldsAlongTheFibre) {
   for (const std::uint32_t segment : {kOpen, kHalfSpace}) {
     for (const glm::vec3 omega_o : {kTangent, -kTangent, glm::vec3(0, 0, 1)}) {
       const ShadingPoint at = fabric().point(segment, kTangent, omega_o);
       for (const glm::vec3 towards : {glm::vec3(0, 0, 1), kTangent, glm::vec3(1, 0, 0)}) {
-        EXPECT_TRUE(std::isfinite(fabric().single_directional(at, towards).y));
-        for (const float sharpness : {0.0f, 1.0f, 150.0f, 1e5f}) {
-          EXPECT_TRUE(std::isfinite(fabric().single_sg(at, {towards, sharpness}).y));
-          EXPECT_TRUE(std::isfinite(harmonics_of_sg({towards, sharpness}).c[35]));
-        }
+        expect_finite_shading(at, towards);
       }
     }
   }

@@ -2,13 +2,26 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <vector>
 
 namespace weft::shading {
 
-// Upper regularised incomplete gamma function Q(a, x), by series or continued fraction.
+// log Gamma(a) for whole and half numbers a, by Gamma(a + 1) = a Gamma(a).
+inline double log_gamma_of_half(double a) {
+  const bool whole = a == std::floor(a);
+  double sum = whole ? 0 : 0.5 * std::log(std::numbers::pi);
+  const double first = whole ? 1 : 0.5;
+  for (int k = 0; first + k < a; ++k) {
+    sum += std::log(first + k);
+  }
+  return sum;
+}
+
+// Upper regularised incomplete gamma function Q(a, x) for whole and half numbers a, by series or
+// continued fraction.
 inline double upper_gamma_share(double a, double x) {
-  const double scale = std::exp(-x + a * std::log(x) - std::lgamma(a));
+  const double scale = std::exp(-x + a * std::log(x) - log_gamma_of_half(a));
   if (x < a + 1) {
     double term = 1 / a;
     double sum = term;

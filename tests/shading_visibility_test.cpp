@@ -109,7 +109,7 @@ TEST(Visibility, BlendMatchesTheReference) {
 
 TEST(Visibility, SumOfGaussiansMatchesTheReferenceWithGamma) {
   for (const auto& v : vectors::kSsgSingle) {
-    const FibreBcsdf bcsdf(grey_material(vectors::kFibres[v.fibre]));
+    const FibreBcsdf& bcsdf = published(v.fibre);
     const vec3 xi(static_cast<float>(v.xi[0]), static_cast<float>(v.xi[1]),
                   static_cast<float>(v.xi[2]));
     const vec3 omega_o = fibre_direction(v.theta_o, 0);
