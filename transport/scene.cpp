@@ -12,16 +12,12 @@
 #include <glm/vec4.hpp>
 
 #include "core/error.h"
+#include "transport/endless_tile.h"
 #include "transport/float_mode.h"
 
 namespace weft::transport {
 
 namespace {
-
-// A leg of a ray ends this many radii before the copies do, and the next one starts anew.
-constexpr float kReachRadii = 20;
-// A tile smaller than its thickness is copied into one of at most this many capsules.
-constexpr std::uint64_t kMaxCapsules = std::uint64_t{1} << 25;
 
 struct DeviceDeleter {
   void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
@@ -66,57 +62,21 @@ struct RayContext {
   float entry_limit_mm = 0;
 };
 
-std::int32_t floor_divide(std::int32_t a, std::int32_t b) {
-  const std::int32_t quotient = a / b;
-  return quotient * b != a && ((a < 0) != (b < 0)) ? quotient - 1 : quotient;
-}
-
-StrandCopy reduced(StrandCopy copy, const fabric::Strand& strand) {
-  if (strand.period_x != 0) {
-    const std::int32_t n = floor_divide(copy.tile_x, strand.period_x);
-    copy.tile_x -= n * strand.period_x;
-    copy.tile_y -= n * strand.period_y;
-  } else if (strand.period_y != 0) {
-    copy.tile_y -= floor_divide(copy.tile_y, strand.period_y) * strand.period_y;
-  }
-  return copy;
-}
-
-// Distances along a ray between which something holds.
-struct Span {
-  double enter;
-  double leave;
-};
-
 }  // namespace
 
 struct Scene::State {
-  explicit State(const fabric::Tile& tile_in) : tile(tile_in) {}
+  explicit State(const fabric::Tile& tile_in) : endless(tile_in) {}
 
-  const fabric::Tile& tile;
+  EndlessTile endless;
   Device device;
-  EmbreeScene block;  // the capsules of `copies` tiles, each with its midpoint in its tile
+  EmbreeScene block;  // the capsules of one block, each with its midpoint in its tile
   EmbreeScene world;  // 3 x 3 instances of block
-  glm::ivec2 copies{1, 1};
-  glm::dvec2 block_size_mm{0, 0};
-  float longest_chord_mm = 0;
-  float overhang_mm = 0;  // no capsule reaches further out of its midpoint's tile
-  float overlap_mm = 0;   // legs of one ray overlap by this
-  float z_min_mm = 0;
-  float z_max_mm = 0;
   std::vector<Capsule> capsules;
   const glm::vec4* ends = nullptr;  // Embree's vertices: of capsule i at 2 i and 2 i + 1
 
   [[nodiscard]] RayContext context_for(const std::optional<StrandCopy>& ignored) const;
-  void place_capsules();
   void build_block();
   void build_world();
-  [[nodiscard]] glm::ivec2 tile_of(glm::vec3 point) const;
-  [[nodiscard]] Span inside_slab(double z, double direction_z) const;
-  [[nodiscard]] glm::ivec2 tile_of_midpoint(std::uint32_t segment) const;
-
-  template <class Visit>
-  void walk(glm::vec3 origin, glm::vec3 direction, float t_max, const Visit& visit) const;
 };
 
 namespace {
@@ -179,21 +139,6 @@ void keep_foreign_overlaps(const RTCFilterFunctionNArguments* arguments) {
   }
 }
 
-// Embree's round curves miss their start cap when a ray runs along them within 2e-4 (measured with
-// 3.13.5). Rays along a coordinate axis, the only ones that meet this in practice, are turned in
-// the plane of the cloth.
-glm::vec3 off_axis(glm::vec3 direction) {
-  constexpr float kTilt = 4e-4f;
-  if (direction.y == 0 && (direction.x == 0 || direction.z == 0)) {
-    direction.y = kTilt;
-  } else if (direction.x == 0 && direction.z == 0) {
-    direction.x = kTilt;
-  } else {
-    return direction;
-  }
-  return glm::normalize(direction);
-}
-
 RTCRay make_ray(glm::vec3 origin, glm::vec3 direction, float t_far) {
   RTCRay ray{};
   ray.org_x = origin.x;
@@ -210,52 +155,10 @@ RTCRay make_ray(glm::vec3 origin, glm::vec3 direction, float t_far) {
 
 }  // namespace
 
-glm::ivec2 Scene::State::tile_of_midpoint(std::uint32_t segment) const {
-  const fabric::Segment s = tile.segment(segment);
-  const glm::vec3 middle = 0.5f * (s.a_mm + s.b_mm);
-  const glm::vec3 wrapped = tile.wrapped_midpoint(segment);
-  return {static_cast<int>(std::lround((middle.x - wrapped.x) / tile.size_mm.x)),
-          static_cast<int>(std::lround((middle.y - wrapped.y) / tile.size_mm.y))};
-}
-
-// Chooses how many tiles make a block: one that a ray crosses in few legs.
-void Scene::State::place_capsules() {
-  float max_radius = 0;
-  float min_radius = std::numeric_limits<float>::max();
-  z_min_mm = std::numeric_limits<float>::max();
-  z_max_mm = -z_min_mm;
-  for (std::uint32_t k = 0; k < tile.segment_count(); ++k) {
-    const fabric::Segment s = tile.segment(k);
-    const glm::vec3 half = 0.5f * (s.b_mm - s.a_mm);
-    overhang_mm =
-        std::max({overhang_mm, std::abs(half.x) + s.radius_mm, std::abs(half.y) + s.radius_mm});
-    longest_chord_mm = std::max(longest_chord_mm, 2.001f * (glm::length(half) + s.radius_mm));
-    max_radius = std::max(max_radius, s.radius_mm);
-    min_radius = std::min(min_radius, s.radius_mm);
-    z_min_mm = std::min(z_min_mm, std::min(s.a_mm.z, s.b_mm.z) - s.radius_mm);
-    z_max_mm = std::max(z_max_mm, std::max(s.a_mm.z, s.b_mm.z) + s.radius_mm);
-  }
-  overlap_mm = 1e-3f * min_radius;
-  overhang_mm *= 1.0001f;
-  const float reach = overhang_mm + std::max(z_max_mm - z_min_mm, kReachRadii * max_radius);
-  std::array<double, 2> needed{};
-  for (int axis = 0; axis < 2; ++axis) {
-    needed[static_cast<std::size_t>(axis)] =
-        std::max(1.0, std::ceil(static_cast<double>(reach) / tile.size_mm[axis]));
-  }
-  if (!(needed[0] * needed[1] * tile.segment_count() <= static_cast<double>(kMaxCapsules))) {
-    throw core::Error(core::Code::kInvalidArgument,
-                      "the tile is too small for its fibres: their segments reach over " +
-                          std::to_string(needed[0]) + " x " + std::to_string(needed[1]) +
-                          " tiles; use shorter segments or more repeats");
-  }
-  copies = {static_cast<int>(needed[0]), static_cast<int>(needed[1])};
-  block_size_mm = {needed[0] * tile.size_mm.x, needed[1] * tile.size_mm.y};
-}
-
 void Scene::State::build_block() {
-  const std::size_t count = static_cast<std::size_t>(copies.x) *
-                            static_cast<std::size_t>(copies.y) * tile.segment_count();
+  const fabric::Tile& tile = endless.tile;
+  const std::size_t count = static_cast<std::size_t>(endless.copies.x) *
+                            static_cast<std::size_t>(endless.copies.y) * tile.segment_count();
   capsules.reserve(count);
   RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
   auto* vertices = static_cast<glm::vec4*>(rtcSetNewGeometryBuffer(
@@ -265,8 +168,8 @@ void Scene::State::build_block() {
   auto* flags = static_cast<std::uint8_t*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, sizeof(std::uint8_t), count));
   check_device(device, "allocating the fibres");
-  for (int y = 0; y < copies.y; ++y) {
-    for (int x = 0; x < copies.x; ++x) {
+  for (int y = 0; y < endless.copies.y; ++y) {
+    for (int x = 0; x < endless.copies.x; ++x) {
       const glm::vec3 corner{static_cast<float>(x) * tile.size_mm.x,
                              static_cast<float>(y) * tile.size_mm.y, 0};
       for (std::uint32_t k = 0; k < tile.segment_count(); ++k) {
@@ -278,7 +181,7 @@ void Scene::State::build_block() {
         vertices[2 * i + 1] = glm::vec4(middle + half, s.radius_mm);
         indices[i] = static_cast<std::uint32_t>(2 * i);
         flags[i] = 0;  // no neighbours: a whole capsule
-        const glm::ivec2 home = tile_of_midpoint(k);
+        const glm::ivec2 home = endless.tile_of_midpoint(k);
         capsules.push_back({tile.segment_strand[k], x - home.x, y - home.y});
       }
     }
@@ -303,18 +206,9 @@ void Scene::State::build_world() {
     rtcSetGeometryInstancedScene(instance, block.get());
     const double step_x = static_cast<double>(i % 3) - 1;
     const double step_y = static_cast<double>(i / 3) - 1;
-    const std::array<float, 12> transform{1,
-                                          0,
-                                          0,
-                                          0,
-                                          1,
-                                          0,
-                                          0,
-                                          0,
-                                          1,
-                                          static_cast<float>(step_x * block_size_mm.x),
-                                          static_cast<float>(step_y * block_size_mm.y),
-                                          0};
+    std::array<float, 12> transform{1, 0, 0, 0, 1, 0, 0, 0, 1};  // columns; the last one moves
+    transform[9] = static_cast<float>(step_x * endless.block_size_mm.x);
+    transform[10] = static_cast<float>(step_y * endless.block_size_mm.y);
     rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, transform.data());
     rtcCommitGeometry(instance);
     rtcAttachGeometryByID(world.get(), instance, i);
@@ -328,70 +222,13 @@ RayContext Scene::State::context_for(const std::optional<StrandCopy>& ignored) c
   RayContext context;
   rtcInitIntersectContext(&context.embree);
   context.capsules = &capsules;
-  context.tile = &tile;
-  context.copies = copies;
+  context.tile = &endless.tile;
+  context.copies = endless.copies;
   context.ignores = ignored.has_value();
   context.ignored = ignored.value_or(StrandCopy{});
   context.ends = ends;
-  context.block_size_mm = glm::vec2(block_size_mm);
+  context.block_size_mm = glm::vec2(endless.block_size_mm);
   return context;
-}
-
-// Cuts a ray into legs that stay where the nine blocks are complete, and calls
-// visit(origin in the central block, direction, length, tiles from the ray's own tile to the
-// central block, distance so far) for each until it returns true.
-template <class Visit>
-void Scene::State::walk(glm::vec3 origin, glm::vec3 direction, float t_max,
-                        const Visit& visit) const {
-  const Span slab = inside_slab(origin.z, direction.z);
-  const double t_start = std::max(0.0, slab.enter);
-  const glm::dvec3 start = glm::dvec3(origin) + t_start * glm::dvec3(direction);
-  const glm::vec3 along = off_axis(direction);
-  const double t_end = std::min(static_cast<double>(t_max),
-                                t_start + inside_slab(start.z, static_cast<double>(along.z)).leave);
-  const glm::ivec2 own = tile_of(origin);
-  double t = t_start;
-  for (int leg = 0; leg < kMaxLegs && t < t_end; ++leg) {
-    double length = t_end - t;
-    const glm::dvec3 at = start + (t - t_start) * glm::dvec3(along);
-    glm::vec3 local(at);
-    glm::ivec2 shift{0, 0};
-    for (int axis = 0; axis < 2; ++axis) {
-      const double block_index = std::floor(at[axis] / block_size_mm[axis]);
-      local[axis] = static_cast<float>(at[axis] - block_index * block_size_mm[axis]);
-      shift[axis] = static_cast<int>(block_index) * copies[axis] - own[axis];
-      if (along[axis] != 0) {
-        const double border = along[axis] > 0
-                                  ? 2 * block_size_mm[axis] - static_cast<double>(overhang_mm)
-                                  : static_cast<double>(overhang_mm) - block_size_mm[axis];
-        length = std::min(
-            length, (border - static_cast<double>(local[axis])) / static_cast<double>(along[axis]));
-      }
-    }
-    if (visit(local, along, static_cast<float>(length), shift, t)) {
-      return;
-    }
-    t += length < t_end - t ? length - static_cast<double>(overlap_mm) : length;
-  }
-}
-
-// Where a line lies between the bounds of all fibres; empty when it never does.
-Span Scene::State::inside_slab(double z, double direction_z) const {
-  const double low = static_cast<double>(z_min_mm - overlap_mm);
-  const double high = static_cast<double>(z_max_mm + overlap_mm);
-  constexpr double kForever = std::numeric_limits<double>::infinity();
-  if (direction_z == 0) {
-    return z < low || z > high ? Span{0, -kForever} : Span{-kForever, kForever};
-  }
-  const double to_low = (low - z) / direction_z;
-  const double to_high = (high - z) / direction_z;
-  return {std::min(to_low, to_high), std::max(to_low, to_high)};
-}
-
-glm::ivec2 Scene::State::tile_of(glm::vec3 point) const {
-  const glm::dvec2 size(tile.size_mm);
-  return {static_cast<int>(std::floor(static_cast<double>(point.x) / size.x)),
-          static_cast<int>(std::floor(static_cast<double>(point.y) / size.y))};
 }
 
 Scene::Scene(const fabric::Tile& tile) : state_(std::make_unique<State>(tile)) {
@@ -406,36 +243,36 @@ Scene::Scene(const fabric::Tile& tile) : state_(std::make_unique<State>(tile)) {
     throw core::Error(core::Code::kFailedPrecondition,
                       "Embree does not start on this machine: a processor with AVX2 is needed");
   }
-  state_->place_capsules();
   state_->build_block();
   state_->build_world();
 }
 
 Scene::~Scene() = default;
 
-const fabric::Tile& Scene::tile() const { return state_->tile; }
+const fabric::Tile& Scene::tile() const { return state_->endless.tile; }
 
 std::optional<Hit> Scene::closest(glm::vec3 origin_mm, glm::vec3 direction, float t_max_mm,
                                   const std::optional<StrandCopy>& ignored) const {
   const FlushDenormals flush;
   RayContext context = state_->context_for(ignored);
   std::optional<Hit> found;
-  state_->walk(origin_mm, direction, t_max_mm,
-               [&](glm::vec3 local, glm::vec3 along, float length, glm::ivec2 shift, double t) {
-                 context.shift = shift;
-                 RTCRayHit query{};
-                 query.ray = make_ray(local, along, length);
-                 query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-                 query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-                 rtcIntersect1(state_->world.get(), &context.embree, &query);
-                 if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
-                   return false;
-                 }
-                 found = Hit{static_cast<float>(t + static_cast<double>(query.ray.tfar)),
-                             query.hit.primID % state_->tile.segment_count(),
-                             copy_of_hit(context, query.hit.primID, query.hit.instID[0])};
-                 return true;
-               });
+  state_->endless.walk(
+      origin_mm, direction, t_max_mm,
+      [&](glm::vec3 local, glm::vec3 along, float length, glm::ivec2 shift, double t) {
+        context.shift = shift;
+        RTCRayHit query{};
+        query.ray = make_ray(local, along, length);
+        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+        rtcIntersect1(state_->world.get(), &context.embree, &query);
+        if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+          return false;
+        }
+        found = Hit{static_cast<float>(t + static_cast<double>(query.ray.tfar)),
+                    query.hit.primID % state_->endless.tile.segment_count(),
+                    copy_of_hit(context, query.hit.primID, query.hit.instID[0])};
+        return true;
+      });
   return found;
 }
 
@@ -444,32 +281,33 @@ bool Scene::occluded(glm::vec3 origin_mm, glm::vec3 direction, float t_max_mm,
   const FlushDenormals flush;
   RayContext context = state_->context_for(ignored);
   bool blocked = false;
-  state_->walk(origin_mm, direction, t_max_mm,
-               [&](glm::vec3 local, glm::vec3 along, float length, glm::ivec2 shift, double) {
-                 context.shift = shift;
-                 context.origin = local;
-                 context.entry_limit_mm = length;
-                 // Far enough to see the exit of a capsule that holds the origin.
-                 const float t_far = std::max(length, state_->longest_chord_mm);
-                 RTCRay ray = make_ray(local, along, t_far);
-                 rtcOccluded1(state_->world.get(), &context.embree, &ray);
-                 blocked = ray.tfar < 0;
-                 return blocked;
-               });
+  state_->endless.walk(
+      origin_mm, direction, t_max_mm,
+      [&](glm::vec3 local, glm::vec3 along, float length, glm::ivec2 shift, double) {
+        context.shift = shift;
+        context.origin = local;
+        context.entry_limit_mm = length;
+        // Far enough to see the exit of a capsule that holds the origin.
+        const float t_far = std::max(length, state_->endless.longest_chord_mm);
+        RTCRay ray = make_ray(local, along, t_far);
+        rtcOccluded1(state_->world.get(), &context.embree, &ray);
+        blocked = ray.tfar < 0;
+        return blocked;
+      });
   return blocked;
 }
 
 StrandCopy Scene::own_copy(std::uint32_t segment) const {
-  const glm::ivec2 home = state_->tile_of_midpoint(segment);
-  const std::uint32_t strand = state_->tile.segment_strand[segment];
-  return reduced({strand, -home.x, -home.y}, state_->tile.strands[strand]);
+  const glm::ivec2 home = state_->endless.tile_of_midpoint(segment);
+  const std::uint32_t strand = state_->endless.tile.segment_strand[segment];
+  return reduced({strand, -home.x, -home.y}, state_->endless.tile.strands[strand]);
 }
 
-glm::ivec2 Scene::tile_of(glm::vec3 point_mm) const { return state_->tile_of(point_mm); }
+glm::ivec2 Scene::tile_of(glm::vec3 point_mm) const { return state_->endless.tile_of(point_mm); }
 
 StrandCopy Scene::seen_from(const StrandCopy& copy, glm::ivec2 tile) const {
   return reduced({copy.strand, copy.tile_x - tile.x, copy.tile_y - tile.y},
-                 state_->tile.strands[copy.strand]);
+                 state_->endless.tile.strands[copy.strand]);
 }
 
 }  // namespace weft::transport

@@ -8,17 +8,9 @@
 #include <glm/vec3.hpp>
 
 #include "fabric/tile.h"
+#include "transport/strand_copy.h"
 
 namespace weft::transport {
-
-// Identifies a strand in endless cloth: the strand and the tile its copy belongs to, reduced by the
-// strand's period, so that equal values mean the same physical fibre.
-struct StrandCopy {
-  std::uint32_t strand = 0;
-  std::int32_t tile_x = 0;
-  std::int32_t tile_y = 0;
-  bool operator==(const StrandCopy&) const = default;
-};
 
 struct Hit {
   float t_mm = 0;             // distance along the (unit) direction
@@ -47,8 +39,8 @@ class Scene {
 
   // First fibre entered by the ray from `origin_mm` (any point of endless cloth) along unit
   // `direction` before `t_max_mm`; fibres equal to `ignored` (relative to the ray's own tile) are
-  // skipped. The ray is followed through as many tiles as it takes, up to kMaxLegs wraps: one that
-  // runs in the plane of the cloth and still meets nothing counts as escaped.
+  // skipped. The ray is followed through as many tiles as it takes, up to EndlessTile::kMaxLegs
+  // wraps: one that runs in the plane of the cloth and still meets nothing counts as escaped.
   [[nodiscard]] std::optional<Hit> closest(glm::vec3 origin_mm, glm::vec3 direction, float t_max_mm,
                                            const std::optional<StrandCopy>& ignored) const;
 
@@ -66,8 +58,6 @@ class Scene {
   // A copy named relative to tile (0, 0), named relative to `tile` instead: what a path does with
   // hit.copy before it goes on from a hit point in another tile.
   [[nodiscard]] StrandCopy seen_from(const StrandCopy& copy, glm::ivec2 tile) const;
-
-  static constexpr int kMaxLegs = 10000;
 
  private:
   struct State;
