@@ -50,36 +50,42 @@ void done(herr_t status, const std::string& path) {
   }
 }
 
+// IEEE binary16, as h5py and numpy write it.
+Handle half_type() {
+  Handle half(H5Tcopy(H5T_IEEE_F32LE));
+  CHECK(H5Tset_fields(half.id(), 15, 10, 5, 0, 10) >= 0);
+  CHECK(H5Tset_size(half.id(), 2) >= 0);
+  CHECK(H5Tset_ebias(half.id(), 15) >= 0);
+  return half;
+}
+
+Handle text_type(std::size_t bytes) {
+  Handle text(H5Tcopy(H5T_C_S1));
+  CHECK(H5Tset_size(text.id(), bytes) >= 0);
+  CHECK(H5Tset_strpad(text.id(), H5T_STR_NULLPAD) >= 0);
+  CHECK(H5Tset_cset(text.id(), H5T_CSET_UTF8) >= 0);
+  return text;
+}
+
 // A copy of the library's type. `text_bytes` is the fixed length of kText.
 Handle type_of(Element element, std::size_t text_bytes = 0) {
-  const auto copy = [](hid_t type) { return Handle(H5Tcopy(type)); };
   switch (element) {
     case Element::kU16:
-      return copy(H5T_STD_U16LE);
+      return Handle(H5Tcopy(H5T_STD_U16LE));
     case Element::kU32:
-      return copy(H5T_STD_U32LE);
+      return Handle(H5Tcopy(H5T_STD_U32LE));
     case Element::kU64:
-      return copy(H5T_STD_U64LE);
+      return Handle(H5Tcopy(H5T_STD_U64LE));
     case Element::kI32:
-      return copy(H5T_STD_I32LE);
+      return Handle(H5Tcopy(H5T_STD_I32LE));
+    case Element::kF16:
+      return half_type();
     case Element::kF32:
-      return copy(H5T_IEEE_F32LE);
+      return Handle(H5Tcopy(H5T_IEEE_F32LE));
     case Element::kF64:
-      return copy(H5T_IEEE_F64LE);
-    case Element::kF16: {
-      Handle half = copy(H5T_IEEE_F32LE);  // IEEE binary16, as h5py and numpy write it
-      CHECK(H5Tset_fields(half.id(), 15, 10, 5, 0, 10) >= 0);
-      CHECK(H5Tset_size(half.id(), 2) >= 0);
-      CHECK(H5Tset_ebias(half.id(), 15) >= 0);
-      return half;
-    }
-    case Element::kText: {
-      Handle text = copy(H5T_C_S1);
-      CHECK(H5Tset_size(text.id(), text_bytes) >= 0);
-      CHECK(H5Tset_strpad(text.id(), H5T_STR_NULLPAD) >= 0);
-      CHECK(H5Tset_cset(text.id(), H5T_CSET_UTF8) >= 0);
-      return text;
-    }
+      return Handle(H5Tcopy(H5T_IEEE_F64LE));
+    case Element::kText:
+      return text_type(text_bytes);
   }
   core::check_failed(__FILE__, __LINE__, "unknown element");
 }
@@ -102,7 +108,8 @@ std::optional<std::uint64_t> bytes_of(const Shape& shape, std::uint64_t element_
 Handle dataset_properties(const Shape& shape, std::size_t element_bytes, bool compress) {
   Handle properties(H5Pcreate(H5P_DATASET_CREATE));
   std::vector<hsize_t> chunk(shape.begin(), shape.end());
-  const std::uint64_t row_bytes = *bytes_of(shape, element_bytes) / shape[0];
+  const std::uint64_t row_bytes =
+      std::max<std::uint64_t>(1, *bytes_of(shape, element_bytes) / shape[0]);
   chunk[0] = std::clamp<std::uint64_t>(kChunkBytes / row_bytes, 1, shape[0]);
   CHECK(H5Pset_chunk(properties.id(), static_cast<int>(chunk.size()), chunk.data()) >= 0);
   CHECK(H5Pset_obj_track_times(properties.id(), false) >= 0);

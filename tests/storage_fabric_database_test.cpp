@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "storage/database_schema.h"
 #include "storage/database_summary.h"
 #include "storage/fabric_database.h"
 #include "storage/user_block.h"
@@ -213,6 +214,17 @@ TEST_F(FabricDatabaseTest, FileOfANewerSchemaAsksForANewerProgram) {
   } catch (const core::Error& error) {
     EXPECT_EQ(error.code(), core::Code::kFailedPrecondition);
     EXPECT_THAT(error.what(), HasSubstr("use a newer weft"));
+  }
+}
+
+TEST(DatabaseFormat, DocumentNamesEveryGroupAndDataset) {
+  const std::string document =
+      core::read_file(std::filesystem::path(WEFT_SOURCE_DIR) / "docs/database_format.md");
+  for (const DatasetSpec& spec : dataset_specs()) {
+    const std::string path = spec.path;
+    const std::size_t slash = path.find('/', 1);
+    EXPECT_THAT(document, HasSubstr("\n## " + path.substr(0, slash) + ":")) << path;
+    EXPECT_THAT(document, HasSubstr('`' + path.substr(slash + 1) + '`')) << path;
   }
 }
 
