@@ -23,6 +23,7 @@ struct Options {
   std::string listen = "127.0.0.1:7411";
   std::string state;
   std::string log_level = "info";
+  std::uint32_t lease_seconds = 30;
   bool insecure = false;
 };
 
@@ -40,6 +41,7 @@ int serve(const Options& options) {
   const sigset_t signals = block_signals();
   coordinator::SchedulerOptions scheduler_options;
   scheduler_options.state_folder = options.state;
+  scheduler_options.queue.lease_ms = options.lease_seconds * 1000;
   scheduler_options.commit = coordinator::commit;
   coordinator::Scheduler scheduler(std::move(scheduler_options), core::system_clock());
   coordinator::Server server(scheduler, options.listen, options.insecure);
@@ -80,6 +82,10 @@ int main(int argc, char** argv) {
       ->required();
   app.add_flag("--insecure", options.insecure,
                "allow an address that other machines reach, though nothing is encrypted");
+  app.add_option("--lease", options.lease_seconds,
+                 "seconds of silence after which a worker's shards go to another")
+      ->check(CLI::Range(2U, 3600U))
+      ->capture_default_str();
   app.add_option("--log-level", options.log_level, "what is logged to stderr")
       ->check(CLI::IsMember({"debug", "info", "warn", "error"}))
       ->capture_default_str();
