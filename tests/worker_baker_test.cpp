@@ -1,8 +1,8 @@
 #include <cmath>
-#include <cstring>
-#include <span>
+#include <thread>
 
 #include <gtest/gtest.h>
+#include <xmmintrin.h>
 
 #include "core/error.h"
 #include "core/half.h"
@@ -193,6 +193,30 @@ TEST(WorkerBaker, Transfer_CutsACellIntoBlocks) {
     EXPECT_GT(v1::array_of<std::int64_t>(result, "sum_of_squares").at(0), 0);
   }
   EXPECT_EQ(paths, 700u);
+}
+
+TEST(WorkerBaker, ManyThreadsAndFloatModes_GiveTheSameBytes) {
+  for (const BakerContext& context :
+       {visibility_context(), transfer_context(), transfer_context(v1::TRANSFER_ESTIMATOR_LIGHT)}) {
+    const auto baker = make_baker(context);
+    std::vector<std::string> alone;
+    for (std::uint64_t shard = 0; shard < 4; ++shard) {
+      alone.push_back(baker->bake(shard, {}, never));
+    }
+    std::vector<std::string> together(4);
+    std::vector<std::thread> threads;
+    for (std::uint64_t shard = 0; shard < 4; ++shard) {
+      threads.emplace_back([&, shard] {
+        const unsigned flush = shard % 2 == 0 ? 0 : 0x8040;
+        _mm_setcsr(_mm_getcsr() | flush);
+        together[shard] = baker->bake(shard, {}, never);
+      });
+    }
+    for (std::thread& thread : threads) {
+      thread.join();
+    }
+    EXPECT_EQ(alone, together);
+  }
 }
 
 TEST(WorkerBaker, EveryKind_StopsWhenTold) {

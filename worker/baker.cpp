@@ -1,11 +1,16 @@
 #include "worker/baker.h"
 
+#include <utility>
+
 #include "core/error.h"
+#include "transport/float_mode.h"
 #include "worker/bakers.h"
 
 namespace weft::worker {
 
-std::unique_ptr<Baker> make_baker(BakerContext context) {
+namespace {
+
+std::unique_ptr<Baker> make_baker_of_kind(const BakerContext& context) {
   switch (context.spec.kind_case()) {
     case v1::TaskSpec::kGeometry:
       return make_geometry_baker(context);
@@ -25,6 +30,29 @@ std::unique_ptr<Baker> make_baker(BakerContext context) {
   throw core::Error(core::Code::kInvalidArgument,
                     "the task is of a kind that this worker does not know; is the worker older "
                     "than the coordinator?");
+}
+
+// Bakes with denormals flushed, whatever mode the calling thread is in: results must not depend on
+// who calls.
+class OneFloatMode : public Baker {
+ public:
+  explicit OneFloatMode(std::unique_ptr<Baker> baker) : baker_(std::move(baker)) {}
+
+  std::string bake(std::uint64_t shard, const std::string& shard_input,
+                   const std::function<bool()>& should_stop) const override {
+    const transport::FlushDenormals flush;
+    return baker_->bake(shard, shard_input, should_stop);
+  }
+
+ private:
+  std::unique_ptr<Baker> baker_;
+};
+
+}  // namespace
+
+std::unique_ptr<Baker> make_baker(BakerContext context) {
+  const transport::FlushDenormals flush;
+  return std::make_unique<OneFloatMode>(make_baker_of_kind(context));
 }
 
 transport::Checkpoint stop_point(const std::function<bool()>& should_stop) {

@@ -6,6 +6,7 @@
 #include "core/digest.h"
 #include "core/random.h"
 #include "shading/fibre_bcsdf.h"
+#include "transport/float_mode.h"
 #include "transport/pca.h"
 #include "transport/signed_distance.h"
 #include "transport/sphere.h"
@@ -115,6 +116,7 @@ void probe_algebra(core::Hasher& hasher) {
 }  // namespace
 
 core::Digest numerics_fingerprint() {
+  const transport::FlushDenormals flush;  // as bakers do
   core::Hasher hasher;
   hasher.field("weft numerics 1");
   probe_libm<float>(hasher);
