@@ -124,7 +124,7 @@ void frame(const v1::Scene& description, const Cloth::Bounds& bounds, Camera::Vi
                                     [](const v1::Cloth& cloth) { return cloth.has_flat(); });
   const glm::dvec3 size = bounds.high_mm - bounds.low_mm;
   view.look_at_mm = 0.5 * (bounds.low_mm + bounds.high_mm);
-  const double shown_mm = all_flat ? 0.7 * std::min(size.x, size.y) : glm::length(size);
+  const double shown_mm = all_flat ? 0.7 * std::min(size.x, size.y) : 0.8 * glm::length(size);
   if (!view.perspective && !(view.height > 0)) {
     view.height = shown_mm;
   }

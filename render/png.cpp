@@ -28,10 +28,6 @@ float srgb_encoded(float linear) {
   return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
 }
 
-float luminance(const glm::vec3& rgb) {
-  return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
-}
-
 void append(png_structp png, png_bytep data, png_size_t size) {
   auto* out = static_cast<std::string*>(png_get_io_ptr(png));
   out->append(reinterpret_cast<const char*>(data), size);
@@ -103,14 +99,14 @@ float automatic_exposure(const Image& image) {
   double sum = 0;
   std::size_t lit = 0;
   for (const glm::vec3& pixel : image.pixels) {
-    const float value = luminance(pixel);
+    const float value = std::fmax(pixel.x, std::fmax(pixel.y, pixel.z));
     if (value > 0 && std::isfinite(value)) {
       sum += value;
       ++lit;
     }
   }
-  constexpr double kMiddleGrey = 0.25;
-  return lit == 0 ? 0 : static_cast<float>(std::log2(kMiddleGrey * static_cast<double>(lit) / sum));
+  constexpr double kMiddleTone = 0.25;
+  return lit == 0 ? 0 : static_cast<float>(std::log2(kMiddleTone * static_cast<double>(lit) / sum));
 }
 
 }  // namespace weft::render

@@ -19,8 +19,8 @@ void write_png(const std::filesystem::path& path, std::uint32_t width, std::uint
 // towards 1, encoded as sRGB. NaN becomes black.
 [[nodiscard]] std::vector<std::uint8_t> tone_mapped(const Image& image, float exposure_stops = 0);
 
-// Stops that bring the mean luminance of the lit pixels to middle grey (0.25); 0 for a black
-// picture.
+// Stops that bring the mean over the lit pixels of their largest channel to a middle tone (0.25);
+// 0 for a black picture.
 [[nodiscard]] float automatic_exposure(const Image& image);
 
 }  // namespace weft::render

@@ -256,6 +256,10 @@ v1::Scene default_scene() {
 }
 
 void expand_picture_defaults(v1::Scene& scene) {
+  v1::Integration& integration = *scene.mutable_integration();
+  if (integration.integrator() == v1::INTEGRATOR_UNSPECIFIED) {
+    integration.set_integrator(v1::INTEGRATOR_PRECOMPUTED);
+  }
   v1::Picture& picture = *scene.mutable_picture();
   if (picture.width() == 0) {
     picture.set_width(512);
@@ -264,11 +268,9 @@ void expand_picture_defaults(v1::Scene& scene) {
     picture.set_height(512);
   }
   if (picture.samples_per_pixel() == 0) {
-    picture.set_samples_per_pixel(64);
-  }
-  v1::Integration& integration = *scene.mutable_integration();
-  if (integration.integrator() == v1::INTEGRATOR_UNSPECIFIED) {
-    integration.set_integrator(v1::INTEGRATOR_PRECOMPUTED);
+    // Shaded in closed form, a fibre is noiseless; paths need more.
+    picture.set_samples_per_pixel(integration.integrator() == v1::INTEGRATOR_PRECOMPUTED ? 16
+                                                                                         : 128);
   }
   if (integration.seed() == 0) {
     integration.set_seed(1);
