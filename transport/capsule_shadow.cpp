@@ -35,11 +35,10 @@ std::uint64_t ones(std::int32_t first, std::int32_t last) {  // bits of one word
 
 // Columns first ... last, which may run over the seam at phi = 0.
 void set_columns(ImageRegion& region, std::int32_t first, std::int32_t last, std::int32_t n) {
+  const std::int32_t turn = first < 0 ? n : (last >= n ? -n : 0);
   for (std::int32_t w = 0; 64 * w < n; ++w) {
-    std::uint64_t word = 0;
-    for (const std::int32_t turn : {-n, 0, n}) {
-      word |= ones(first + turn - 64 * w, last + turn - 64 * w);
-    }
+    const std::uint64_t word = ones(first - 64 * w, last - 64 * w) |
+                               (turn == 0 ? 0 : ones(first + turn - 64 * w, last + turn - 64 * w));
     region.columns[static_cast<std::size_t>(w)] = word & ones(-64 * w, n - 1 - 64 * w);
   }
 }
@@ -164,32 +163,32 @@ bool holds_origin(const SeenCapsule& capsule) {
   return glm::dot(off, off) < capsule.radius * capsule.radius;
 }
 
-std::optional<ImageRegion> region_of_ball(glm::vec3 centre, float radius,
-                                          std::uint32_t resolution) {
-  const auto n = static_cast<std::int32_t>(resolution);
-  ImageRegion region;
+bool find_open_region(glm::vec3 centre, float radius, const CoverMask& mask, ImageRegion& region) {
+  const auto n = static_cast<std::int32_t>(mask.resolution());
   const float across2 = centre.x * centre.x + centre.y * centre.y;
   const float distance = std::sqrt(across2 + centre.z * centre.z);
   if (distance <= 1.0001f * radius) {
+    region.first_row = 0;
     region.last_row = n - 1;
     set_columns(region, 0, n - 1, n);
-    return region;
+    return !mask.is_covered(region);
   }
   const float across = std::sqrt(across2);
   const float elevation = acute_angle(across / distance, std::abs(centre.z) / distance);
   const float theta = centre.z > 0 ? elevation : kPi - elevation;
   const float alpha = arc_sine(std::min(1.0f, radius / distance)) + kMargin;
-  const float rows_per_radian = static_cast<float>(resolution) / kPi;
+  const float rows_per_radian = static_cast<float>(n) / kPi;
   region.first_row =
       std::max(0, static_cast<std::int32_t>(std::ceil((theta - alpha) * rows_per_radian - 0.5f)));
   region.last_row = std::min(
       n - 1, static_cast<std::int32_t>(std::floor((theta + alpha) * rows_per_radian - 0.5f)));
-  if (region.first_row > region.last_row) {
-    return std::nullopt;
+  region.first_row = mask.next_open_row(region.first_row, region.last_row);
+  if (region.first_row < 0) {
+    return false;  // most balls end here in dense cloth
   }
   if (across <= 1.0001f * radius || theta - alpha <= 0 || theta + alpha >= kPi) {
     set_columns(region, 0, n - 1, n);
-    return region;
+    return !mask.is_covered(region);
   }
   const float turn = acute_angle(std::abs(centre.y) / across, std::abs(centre.x) / across);
   const float half = centre.x > 0 ? turn : kPi - turn;
@@ -202,10 +201,10 @@ std::optional<ImageRegion> region_of_ball(glm::vec3 centre, float radius,
   const auto last =
       static_cast<std::int32_t>(std::floor((phi + width) * columns_per_radian - 0.5f));
   if (first > last) {
-    return std::nullopt;
+    return false;
   }
   set_columns(region, first, std::min(last, first + n - 1), n);
-  return region;
+  return !mask.is_covered(region);
 }
 
 void paint(const SeenCapsule& capsule, const ImageRegion& region, const SphereGrid& grid,

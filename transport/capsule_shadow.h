@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -30,10 +29,11 @@ struct SeenCapsule {
 
 [[nodiscard]] bool holds_origin(const SeenCapsule& capsule);
 
-// A rectangle that holds every pixel whose centre a ball hides from the origin; nothing when there
-// is none. The whole image when the ball holds the origin.
-[[nodiscard]] std::optional<ImageRegion> region_of_ball(glm::vec3 centre, float radius,
-                                                        std::uint32_t resolution);
+// Finds a rectangle that holds every pixel whose centre a ball hides from the origin, the whole
+// image when the ball holds the origin. False when it has no pixel that `mask` does not cover yet;
+// `region`, which the caller keeps for the next ball, is then of no meaning.
+[[nodiscard]] bool find_open_region(glm::vec3 centre, float radius, const CoverMask& mask,
+                                    ImageRegion& region);
 
 // Covers the pixels of `region` whose centres the capsule hides. Exact: seen from a point outside,
 // a capsule hides the caps of its two balls and the quadrilateral between two tangent planes.

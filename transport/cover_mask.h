@@ -11,7 +11,7 @@ namespace weft::transport {
 inline constexpr std::uint32_t kMaxMaskResolution = 1024;
 
 // A rectangle of the image of the sphere (sphere.h): rows first_row ... last_row, and in each word
-// of 64 columns a mask of those that belong to it.
+// of 64 columns that the resolution has a mask of those that belong to it.
 struct ImageRegion {
   std::int32_t first_row = 0;
   std::int32_t last_row = -1;

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
 
 #include <glm/geometric.hpp>
 
@@ -79,9 +78,7 @@ class Painter {
     stack[depth++] = 0;
     while (depth > 0 && !blind_) {
       const TreeNode& node = tree_.nodes[stack[--depth]];
-      const auto region =
-          region_of_ball(node.centre_mm + shift_mm_, node.radius_mm, grid_.resolution);
-      if (!region || mask_.is_covered(*region)) {
+      if (!find_open_region(node.centre_mm + shift_mm_, node.radius_mm, mask_, region_)) {
         continue;
       }
       if (node.count > 0) {
@@ -113,10 +110,9 @@ class Painter {
         return;
       }
       const glm::vec3 centre = capsule.start + 0.5f * capsule.length * capsule.axis;
-      const auto region =
-          region_of_ball(centre, 0.5f * capsule.length + capsule.radius, grid_.resolution);
-      if (region && !mask_.is_covered(*region)) {
-        paint(capsule, *region, grid_, mask_);
+      const float reach = 0.5f * capsule.length + capsule.radius;
+      if (find_open_region(centre, reach, mask_, region_)) {
+        paint(capsule, region_, grid_, mask_);
       }
     }
   }
@@ -139,6 +135,7 @@ class Painter {
   glm::vec3 eye_mm_;
   StrandCopy own_;
   CoverMask mask_;
+  ImageRegion region_;  // scratch
   bool blind_ = false;  // the eye is inside another fibre
   glm::vec3 shift_mm_{0, 0, 0};
   glm::ivec2 shift_tiles_{0, 0};
