@@ -202,6 +202,9 @@ void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& pl
   if (stage.is_done()) {
     stage.ended_at = now;
   }
+  if (stage.done > 0) {
+    job.phase = JobPhase::kRunning;
+  }
 }
 
 void Queue::end_job(JobState& job, JobPhase phase, Time now, Actions& actions) {
