@@ -54,16 +54,16 @@ SHARED vec3 gamma_factor_tt(FibreLobes lobes, GammaLight light, float theta) {
 // The product of the two Gaussians in theta.
 struct GammaPeak {
   float theta;      // theta_m = (-b theta_o + lambda theta') / (b + lambda)
-  float precision;  // b + lambda
+  float sharpness;  // b + lambda
   float height;     // a_m
 };
 
 SHARED GammaPeak gamma_peak(float b, float theta_o, GammaLight light) {
   GammaPeak p;
-  p.precision = b + light.lambda;
-  p.theta = (light.lambda * light.theta - b * theta_o) / p.precision;
+  p.sharpness = b + light.lambda;
+  p.theta = (light.lambda * light.theta - b * theta_o) / p.sharpness;
   float d = theta_o + light.theta;
-  p.height = exp(-0.5f * b * light.lambda / p.precision * d * d);
+  p.height = exp(-0.5f * b * light.lambda / p.sharpness * d * d);
   return p;
 }
 
@@ -77,7 +77,7 @@ SHARED vec3 gamma_factor(FibreLobes lobes, GammaLight light, float theta, bool t
 // One lobe in closed form: the factor at the peak times the Gaussian's mass within +-pi/2.
 SHARED vec3 gamma_lobe_closed(FibreLobes lobes, GammaLight light, GammaPeak peak,
                               bool transmission) {
-  float root = sqrt(0.5f * peak.precision);
+  float root = sqrt(0.5f * peak.sharpness);
   float mass =
       error_function(root * (kHalfPi - peak.theta)) + error_function(root * (kHalfPi + peak.theta));
   float scale = peak.height * 0.5f * 1.77245385f / root * mass;
@@ -118,12 +118,12 @@ SHARED Gl12Node gl12_node(int k) {
 
 SHARED vec3 gamma_lobe_gl12(FibreLobes lobes, GammaLight light, GammaPeak peak, float theta_o,
                             bool transmission) {
-  float reach = 4.5f * inversesqrt(peak.precision);
+  float reach = 4.5f * inversesqrt(peak.sharpness);
   float low = max(-kHalfPi, peak.theta - reach);
   float high = min(kHalfPi, peak.theta + reach);
   float middle = 0.5f * (low + high);
   float half_width = 0.5f * (high - low);
-  float b = peak.precision - light.lambda;
+  float b = peak.sharpness - light.lambda;
   vec3 sum = vec3(0.0f, 0.0f, 0.0f);
   for (int k = 0; k < 12; ++k) {
     Gl12Node node = gl12_node(k);
@@ -145,7 +145,7 @@ SHARED vec3 gamma_lobe(FibreLobes lobes, GammaLight light, float theta_o, bool t
   }
   bool closed = method == kGammaClosed;
   if (method == kGammaHybrid) {
-    closed = abs(peak.theta) + 3.0f * inversesqrt(peak.precision) < 1.0471976f;
+    closed = abs(peak.theta) + 3.0f * inversesqrt(peak.sharpness) < 1.0471976f;
   }
   if (closed) {
     return gamma_lobe_closed(lobes, light, peak, transmission);
