@@ -94,14 +94,19 @@ void expand_precompute(v1::Precompute& settings) {
   fill(settings, &Settings::has_sg_sharpness, &Settings::set_sg_sharpness, 128);
 }
 
-// Lowers fibre_share until the tile has about kPreviewSegments. Fewer fibres of the same cover are
-// thicker by the root of the share, and so are their segments longer: segments go with its power
-// 3/2, as far as every ply keeps its fibres and every fibre its bends.
+// Lengthens segments, then lowers fibre_share until the tile has about kPreviewSegments. Fewer
+// fibres of the same cover are thicker by the root of the share, and so are their segments longer:
+// segments go with its power 3/2, as far as every ply keeps its fibres and every fibre its bends.
 void thin_for_preview(v1::FabricDescription& description) {
   constexpr double kLeastShare = 0.001;
   constexpr int kMostSteps = 4;
+  constexpr double kLongSegment = 12;
   v1::Exemplar& exemplar = *description.mutable_exemplar();
   std::uint64_t segments = estimate_tile(description).segments;
+  if (segments > kPreviewSegments * 11 / 10) {
+    exemplar.set_segment_length_radii(std::max(exemplar.segment_length_radii(), kLongSegment));
+    segments = estimate_tile(description).segments;
+  }
   for (int step = 0; step < kMostSteps && segments > kPreviewSegments * 11 / 10; ++step) {
     const double before = exemplar.fibre_share();
     const double excess = static_cast<double>(segments) / kPreviewSegments;
@@ -148,7 +153,6 @@ void apply_quality(v1::FabricDescription& description) {
     settings.set_visibility_resolution(std::min(settings.visibility_resolution(), 64U));
     settings.set_pca_sample_segments(std::min(settings.pca_sample_segments(), 1024U));
     settings.set_cell_length_mfp(std::max(settings.cell_length_mfp(), 2.0));
-    exemplar.set_segment_length_radii(std::max(exemplar.segment_length_radii(), 12.0));
     exemplar.set_repeats_x(1);
     exemplar.set_repeats_y(1);
     thin_for_preview(description);
