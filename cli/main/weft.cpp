@@ -15,6 +15,8 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", "weft 0.1.0");
   // One line per command, in the order of commands.h.
+  cli::add_new(app);
+  cli::add_import(app);
   cli::add_preview(app);
   cli::add_export(app);
   cli::add_run(app);
