@@ -1,8 +1,10 @@
+#include <filesystem>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "render/obj_mesh.h"
 #include "render/scene_description.h"
 
 namespace weft::render {
@@ -92,6 +94,28 @@ TEST(SceneDescription, TheDefaultSceneIsComplete) {
   EXPECT_EQ(scene.cloths_size(), 1);
   EXPECT_GT(scene.picture().samples_per_pixel(), 0U);
   EXPECT_EQ(scene.integration().integrator(), v1::INTEGRATOR_PRECOMPUTED);
+}
+
+TEST(SceneDescription, TheExamplesAreScenes) {
+  const std::filesystem::path folder = std::filesystem::path(WEFT_SOURCE_DIR) / "examples/scenes";
+  int scenes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".textproto") {
+      continue;
+    }
+    ++scenes;
+    const v1::Scene scene = load_scene(entry.path());
+    EXPECT_GT(scene.lights_size(), 0);
+    for (const v1::Cloth& cloth : scene.cloths()) {
+      if (cloth.has_shell()) {
+        EXPECT_FALSE(read_obj(cloth.shell().obj_file()).triangles.empty());
+      }
+    }
+  }
+  EXPECT_GE(scenes, 2);
+  // The default scene, written out.
+  const v1::Scene swatch = load_scene(folder / "swatch.textproto");
+  EXPECT_EQ(swatch.SerializeAsString(), default_scene().SerializeAsString());
 }
 
 }  // namespace
