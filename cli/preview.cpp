@@ -85,7 +85,8 @@ void preview(const PreviewOptions& options) {
   const v1::FabricDescription description =
       fabric::load_description(options.fabric, parse_quality(options.quality));
   const fabric::TileEstimate estimate = fabric::estimate_tile(description);
-  const fabric::Tile tile = fabric::build_tile(description);
+  fabric::RelaxReport relaxed;
+  const fabric::Tile tile = fabric::build_tile(description, &relaxed);
   const double build_seconds = stopwatch.seconds();
   draw(options, description, tile);
   const double seconds = stopwatch.seconds();
@@ -97,6 +98,8 @@ void preview(const PreviewOptions& options) {
                                     {"threads", tile.threads.size()},
                                     {"fibres", tile.strands.size()},
                                     {"segments", tile.segment_count()},
+                                    {"deepest_overlap_share", relaxed.overlap_share},
+                                    {"relax_iterations", relaxed.iterations},
                                     {"memory_bytes", estimate.memory_bytes},
                                     {"build_seconds", build_seconds},
                                     {"seconds", seconds}};
@@ -109,6 +112,8 @@ void preview(const PreviewOptions& options) {
   std::printf("%zu threads, %zu fibres, %u segments, %s\n", tile.threads.size(),
               tile.strands.size(), tile.segment_count(),
               format_bytes(estimate.memory_bytes).c_str());
+  std::printf("yarns overlap by at most %.1f %% of the thinner radius (%u iterations)\n",
+              100 * relaxed.overlap_share, relaxed.iterations);
   std::printf("%s drawn in %s\n", options.out.c_str(), format_duration(seconds).c_str());
 }
 

@@ -16,7 +16,7 @@ namespace weft::cli {
 namespace {
 
 constexpr std::uint32_t kSamples = 2;  // per pixel and direction
-constexpr std::uint32_t kShadowSide = 1024;
+constexpr std::uint32_t kShadowSide = 1536;
 constexpr float kShadowBiasRadii = 1.5F;
 constexpr glm::vec3 kBackground{0.9F, 0.9F, 0.9F};
 
@@ -180,7 +180,7 @@ struct ShadowMap {
 ShadowMap map_shadows(const fabric::Tile& tile, const Raster& eye, glm::vec3 to_light) {
   ShadowMap map;
   const float side_mm =
-      1.5F * static_cast<float>(std::max(eye.width, eye.height)) / eye.pixels_per_mm;
+      2.2F * static_cast<float>(std::max(eye.width, eye.height)) / eye.pixels_per_mm;
   map.raster.rotation = look_along(to_light, 0);
   map.raster.width = map.raster.height = kShadowSide;
   map.raster.pixels_per_mm = static_cast<float>(kShadowSide) / side_mm;

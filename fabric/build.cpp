@@ -36,6 +36,22 @@ void refuse_if_too_large(const TileEstimate& estimate) {
   }
 }
 
+void refuse_if_too_long(const YarnLayout& repeat) {
+  std::uint64_t nodes = 0;
+  for (const YarnCurve& curve : repeat.curves) {
+    nodes += curve.nodes.size();
+  }
+  if (nodes > kRelaxedNodeLimit) {
+    std::array<char, 300> text{};
+    std::snprintf(text.data(), text.size(),
+                  "one repeat has %zu threads and %.3g nodes on them, more than the %.3g that are "
+                  "relaxed in reasonable time; crop the draft (weave.crop)",
+                  repeat.curves.size(), static_cast<double>(nodes),
+                  static_cast<double>(kRelaxedNodeLimit));
+    throw core::Error(core::Code::kResourceExhausted, text.data());
+  }
+}
+
 void refuse_if_overlapping(const RelaxReport& report) {
   if (report.overlap_share > kOverlapTolerance) {
     std::array<char, 300> text{};
@@ -95,7 +111,7 @@ void bound_height(Tile& tile) {
 
 }  // namespace
 
-Tile build_tile(const v1::FabricDescription& description) {
+Tile build_tile(const v1::FabricDescription& description, RelaxReport* report) {
   refuse_if_too_large(estimate_tile(description));
   Tile tile;
   for (const v1::Yarn& yarn : description.yarns()) {
@@ -107,7 +123,12 @@ Tile build_tile(const v1::FabricDescription& description) {
     const glm::uvec2 repeats{description.exemplar().repeats_x(),
                              description.exemplar().repeats_y()};
     YarnLayout repeat = lay_out(description);
-    refuse_if_overlapping(relax(repeat));
+    refuse_if_too_long(repeat);
+    const RelaxReport relaxed = relax(repeat);
+    refuse_if_overlapping(relaxed);
+    if (report != nullptr) {
+      *report = relaxed;
+    }
     const YarnLayout layout = repeat_layout(repeat, repeats);
     tile.size_mm = glm::vec2(layout.size_mm);
     tile.blocks = repeats;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "fabric/relax.h"
 #include "fabric/tile.h"
 #include "proto/weft/v1/fabric.pb.h"
 
@@ -11,8 +12,10 @@ namespace weft::fabric {
 // Builds the fibres of one periodic tile from a canonical description (see description.h) or its
 // geometry part. The same description gives the same bytes. Throws core::Error(kInvalidArgument)
 // when no such cloth can be built (yarns that cannot be packed) and kResourceExhausted when the
-// tile would exceed kTileLimitBytes.
-[[nodiscard]] Tile build_tile(const v1::FabricDescription& description);
+// tile would exceed kTileLimitBytes or one repeat kRelaxedNodeLimit.
+// When `report` is given, it is told how the yarns were relaxed (explicit fibres are not).
+[[nodiscard]] Tile build_tile(const v1::FabricDescription& description,
+                              RelaxReport* report = nullptr);
 
 // What a tile will need, computed from the description alone, before any of it is built.
 struct TileEstimate {
@@ -23,6 +26,10 @@ struct TileEstimate {
   std::uint64_t memory_bytes = 0;
 };
 [[nodiscard]] TileEstimate estimate_tile(const v1::FabricDescription& description);
+
+// Nodes of the centre curves of one repeat: 16 for every crossing of a weave. Relaxing so many
+// takes minutes.
+inline constexpr std::uint64_t kRelaxedNodeLimit = 400000;
 
 inline constexpr std::uint64_t kTileLimitBytes = std::uint64_t{2} << 30;
 

@@ -20,6 +20,7 @@ constexpr std::uint32_t kPatience = 240;
 constexpr double kProgress = 0.9;
 constexpr std::uint32_t kMostIterations = 2400;
 constexpr std::uint32_t kIterationsPerPairList = 8;
+constexpr double kListMargin = 0.25;  // in the thinnest radius; what is missed shows in the end
 // The forces, as shares of what would level a node with its neighbours. The shortest waves shrink
 // by 1 - 2 kTension - 8/3 kBending an iteration.
 constexpr double kTension = 0.20;
@@ -32,6 +33,9 @@ constexpr double kBulge = 0.05;       // towards keeping the section's area
 constexpr double kPush = 1.2;         // of the mean correction of a node's contacts
 // What is aimed at, below the tolerance that is promised.
 constexpr double kAim = 0.6 * kOverlapTolerance;
+// ... and when that has taken too long.
+constexpr double kLateAim = 0.95 * kOverlapTolerance;
+constexpr std::uint32_t kPatientIterations = 360;
 
 double strength_at(std::uint32_t iteration) {
   if (iteration < kTightIterations) {
@@ -54,7 +58,7 @@ class Relaxation {
     double best = 1e300;
     while (report.iterations < kMostIterations) {
       if (report.iterations % kIterationsPerPairList == 0) {
-        pairs_ = near_pairs(body_, thinnest_);
+        pairs_ = near_pairs(body_, kListMargin * thinnest_);
       }
       const double strength = strength_at(report.iterations);
       straighten(strength);
@@ -62,7 +66,8 @@ class Relaxation {
       const double overlap = push_apart();
       smooth_sections(strength);
       ++report.iterations;
-      if (report.iterations >= kLeastIterations && overlap < kAim && measure() < kAim) {
+      const double aim = report.iterations < kPatientIterations ? kAim : kLateAim;
+      if (report.iterations >= kLeastIterations && overlap < aim && measure() < aim) {
         break;
       }
       if (report.iterations % kPatience == 0 && report.iterations > kLeastIterations) {

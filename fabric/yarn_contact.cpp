@@ -182,13 +182,15 @@ YarnBody::YarnBody(const YarnLayout& layout) : size_mm(layout.size_mm) {
 YarnBody::Neighbour YarnBody::neighbour(std::uint32_t node, int steps) const {
   const Curve& curve = curves[curve_of[node]];
   const auto count = static_cast<int>(curve.count);
-  const int at = static_cast<int>(node - curve.first) + steps;
-  int turns = at / count;
-  if (at < turns * count) {
-    --turns;
+  int at = static_cast<int>(node - curve.first) + steps;
+  glm::dvec3 shift{0};
+  for (; at >= count; at -= count) {
+    shift += curve.period_mm;
   }
-  return {curve.first + static_cast<std::uint32_t>(at - turns * count),
-          curve.period_mm * static_cast<double>(turns)};
+  for (; at < 0; at += count) {
+    shift -= curve.period_mm;
+  }
+  return {curve.first + static_cast<std::uint32_t>(at), shift};
 }
 
 void YarnBody::update_frames() {
@@ -284,7 +286,7 @@ Contact contact_of(const YarnBody& body, const NearPair& pair) {
   const glm::dvec3 unit_u = along_u / std::max(glm::length(along_u), kTiny);
   const glm::dvec3 unit_v = along_v / std::max(glm::length(along_v), kTiny);
   const double cosine = glm::dot(unit_u, unit_v);
-  if (distance > kTiny && std::abs(cosine) > kSideBySide) {
+  if (contact.overlap_mm > 0 && distance > kTiny && std::abs(cosine) > kSideBySide) {
     const glm::dvec3 sum = unit_u + unit_v * (cosine < 0 ? -1.0 : 1.0);
     const glm::dvec3 n = stretched_normal(u, v, d, sum / glm::length(sum));
     const double overlap = u.reach(n) + v.reach(n) - glm::dot(n, d);
