@@ -15,7 +15,8 @@ namespace weft::transport {
 // omega_0 after at least one scattering (Khungurn et al. 2017, section 4.2).
 enum class Estimator {
   // The path's own exit is its light: 4 pi tau Y_j0(exit) Y_j1(omega_1). No shadow rays; the light
-  // is drawn from the density that the cloth transports, 16 to 38 times less variance per second.
+  // is drawn from the density that the cloth transports: less variance per path, and no shadow
+  // rays.
   kExit,
   // The paper's: one light per path, uniform over the upper hemisphere, connected to every vertex.
   kLight,

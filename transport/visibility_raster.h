@@ -9,11 +9,11 @@
 
 namespace weft::transport {
 
-// visibility_bits() without rays, 10 to 30 times faster in dense cloth: what a capsule hides from a
-// point is known exactly (capsule_shadow.h), so capsules are painted into the image of the sphere,
-// near ones first, and whatever lies behind covered pixels is skipped, until nothing is left to
-// see. Pixels differ from the rays' only where a ray grazes a fibre within rounding. Immutable: any
-// thread may call.
+// visibility_bits() without rays, some 17 times faster on a 4/1 satin (bench/): what a capsule
+// hides from a point is known exactly (capsule_shadow.h), so capsules are painted into the image of
+// the sphere, near ones first, and whatever lies behind covered pixels is skipped, until nothing is
+// left to see. Pixels differ from the rays' only where a ray grazes a fibre within rounding.
+// Immutable: any thread may call.
 class VisibilityRaster {
  public:
   // Keeps a reference to `scene`, which must outlive it.
