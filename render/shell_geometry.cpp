@@ -224,7 +224,7 @@ class Builder {
   static std::int32_t behind(std::uint32_t triangle, const Behind& behind) {
     switch (behind.kind) {
       case Behind::kSibling:
-        return static_cast<std::int32_t>(3 * triangle + behind.which);
+        return static_cast<std::int32_t>(std::size_t{3} * triangle + behind.which);
       case Behind::kTop:
         return static_cast<std::int32_t>(Outside::kTop);
       case Behind::kBottom:
