@@ -7,49 +7,23 @@
 #include <grpcpp/security/credentials.h>
 
 #include "core/error.h"
+#include "proto/address.h"
 #include "proto/limits.h"
 #include "proto/status.h"
 
 namespace weft::cli {
-
-namespace {
-
-// host:port with a port of 1 to 65535, or unix:/path. gRPC would take more and say less. Returns
-// what is wrong, or nothing.
-std::string mistake_in_address(const std::string& address) {
-  const auto mistake = [&](const std::string& what) {
-    return "'" + address + "' is not an address: " + what + "; write host:port, like " +
-           kDefaultCoordinator + ", or unix:/path";
-  };
-  if (address.rfind("unix:", 0) == 0) {
-    return address.size() > 5 ? std::string() : mistake("no path follows unix:");
-  }
-  const std::size_t colon = address.rfind(':');
-  if (colon == std::string::npos || colon == 0) {
-    return mistake("it has no port");
-  }
-  const std::string port = address.substr(colon + 1);
-  if (port.empty() || port.size() > 5 ||
-      port.find_first_not_of("0123456789") != std::string::npos || std::stoul(port) < 1 ||
-      std::stoul(port) > 65535) {
-    return mistake("its port is not a number from 1 to 65535");
-  }
-  return "";
-}
-
-}  // namespace
 
 void add_coordinator_option(CLI::App& command, std::string& address) {
   address = kDefaultCoordinator;
   command
       .add_option("--coordinator", address, "Address of the coordinator: host:port or unix:/path")
       ->envname("WEFT_COORDINATOR")
-      ->check(CLI::Validator(mistake_in_address, "", "address"))
+      ->check(CLI::Validator(v1::mistake_in_address, "", "address"))
       ->capture_default_str();
 }
 
 Client::Client(const std::string& address) : address_(address) {
-  const std::string mistake = mistake_in_address(address);
+  const std::string mistake = v1::mistake_in_address(address);
   if (!mistake.empty()) {
     throw core::Error(core::Code::kInvalidArgument, mistake);
   }

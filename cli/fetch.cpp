@@ -51,13 +51,14 @@ void run(const FetchOptions& options) {
   const FetchOutcome outcome = fetch_version(client, version, output, terminal_report());
   if (options.wants_json) {
     print_json({{"output", output},
-                {"was_there", outcome == FetchOutcome::kWasThere},
+                {"was_there", outcome.was_there},
+                {"bytes_kept", outcome.bytes_kept},
                 {"version", to_json(version)}});
     return;
   }
   fmt::print("{}: {}, {}, content {}{}\n", output, reference_text(version),
              format_bytes(version.size_bytes()), short_digest(version.content_digest()),
-             outcome == FetchOutcome::kWasThere ? " (was there already)" : "");
+             outcome.was_there ? " (was there already)" : "");
 }
 
 }  // namespace

@@ -190,12 +190,13 @@ FetchOutcome fetch_version(Client& client, const v1::Version& version,
                            const std::filesystem::path& path, const FetchReport& report) {
   const core::Digest digest = version_digest(version);
   if (is_this_version(path, version)) {
-    return FetchOutcome::kWasThere;
+    return {true, 0};
   }
   PartFile part(path.string() + "." + digest.hex().substr(0, 16) + ".part");
   if (part.size_bytes() > version.size_bytes()) {
     part.clear();
   }
+  const std::uint64_t bytes_kept = part.size_bytes();
   fetch_rest(client, version, part, report);
   if (!is_this_version(part.path(), version)) {
     part.clear();
@@ -204,7 +205,7 @@ FetchOutcome fetch_version(Client& client, const v1::Version& version,
                           " is not what was published; it was thrown away, fetch it again");
   }
   core::publish_file(part.path(), path);
-  return FetchOutcome::kFetched;
+  return {false, bytes_kept};
 }
 
 }  // namespace weft::cli

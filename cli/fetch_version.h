@@ -20,7 +20,10 @@ namespace weft::cli {
 // Called with bytes that are here and bytes in all.
 using FetchReport = std::function<void(std::uint64_t, std::uint64_t)>;
 
-enum class FetchOutcome { kFetched, kWasThere };
+struct FetchOutcome {
+  bool was_there = false;        // nothing had to be fetched
+  std::uint64_t bytes_kept = 0;  // of an earlier fetch that was broken off
+};
 
 // Brings the version's file to `path`: written beside as PATH.DIGEST.part, gone on with at its
 // length when an earlier fetch was broken off, checked against its digest, renamed. A file at

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "core/check.h"
 #include "proto/limits.h"
 
@@ -34,6 +36,13 @@ bool has_name(const Attempt& attempt, const v1::AttemptName& name) {
 }
 
 }  // namespace
+
+std::string log_name(const Attempt& attempt) {
+  const v1::Assignment& assignment = attempt.assignment;
+  return fmt::format("job={} attempt={} fabric={} stage={} first_shard={} shards={}",
+                     assignment.name().job_id(), assignment.name().attempt(), assignment.fabric(),
+                     assignment.stage(), assignment.first_shard(), assignment.shards());
+}
 
 void AttemptTable::fill(v1::SynchronizeRequest& request) const {
   for (const auto& attempt : attempts_) {

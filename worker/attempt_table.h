@@ -31,6 +31,9 @@ struct Attempt {
   std::atomic<bool> should_stop{false};
 };
 
+// "job=... attempt=... stage=...": the attempt in a log line.
+[[nodiscard]] std::string log_name(const Attempt& attempt);
+
 // One shard to compute.
 struct ShardClaim {
   std::shared_ptr<Attempt> attempt;

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/interrupt.h"
+#include "proto/address.h"
 #include "proto/limits.h"
 #include "worker/lease_loop.h"
 
@@ -41,19 +42,6 @@ std::string default_scratch() {
                                           : std::string("/tmp/weft-worker");
 }
 
-std::string mistake_in_address(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  const bool is_path = address.rfind("unix:", 0) == 0 && address.size() > 5;
-  const std::string port = colon == std::string::npos ? "" : address.substr(colon + 1);
-  const bool is_port = !port.empty() && port.size() <= 5 &&
-                       port.find_first_not_of("0123456789") == std::string::npos &&
-                       std::stoul(port) >= 1 && std::stoul(port) <= 65535;
-  if (is_path || (colon != 0 && is_port)) {
-    return "";
-  }
-  return "'" + address + "' is not an address; write host:port, like 127.0.0.1:7411, or unix:/path";
-}
-
 struct Flags {
   std::string coordinator = "127.0.0.1:7411";
   std::string log_level = "info";
@@ -69,7 +57,7 @@ void declare(CLI::App& app, Flags& flags) {
                               static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
   app.add_option("--coordinator", flags.coordinator, "Address: host:port or unix:/path")
       ->envname("WEFT_COORDINATOR")
-      ->check(CLI::Validator(mistake_in_address, "", "address"))
+      ->check(CLI::Validator(weft::v1::mistake_in_address, "", "address"))
       ->capture_default_str();
   app.add_option("--name", flags.worker.name, "Name for people, at most 128 characters")
       ->check([](const std::string& name) {
