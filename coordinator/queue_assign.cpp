@@ -28,7 +28,8 @@ void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
   std::uint64_t held = 0;
   std::uint32_t free = report.free_attempts;
   // What the worker owns and did not list was in an answer that it never saw.
-  for (const auto& [id, attempt] : attempts_) {
+  for (const auto& entry : attempts_) {
+    const Attempt& attempt = entry.second;
     if (attempt.worker != report.worker) {
       continue;
     }
@@ -173,7 +174,8 @@ std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
   std::uint64_t workers = 0;
   std::uint64_t idle = 0;  // of the others
   std::uint64_t idle_threads = 0;
-  for (const auto& [id, other] : workers_) {
+  for (const auto& entry : workers_) {
+    const WorkerState& other = entry.second;
     if (!is_live(other, now) || job.fingerprint != other.fingerprint) {
       continue;
     }
@@ -181,7 +183,7 @@ std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
     const bool has_attempt = std::any_of(attempts_.begin(), attempts_.end(), [&](const auto& a) {
       return a.second.worker == other.id;
     });
-    if (id != worker.id && !has_attempt) {
+    if (other.id != worker.id && !has_attempt) {
       ++idle;
       idle_threads += other.threads;
     }
