@@ -51,6 +51,11 @@ struct Grid {
   glm::ivec2 cells{1};
   std::vector<std::vector<Copy>> copies;  // [cells.y, cells.x]
 
+  [[nodiscard]] std::size_t slot(glm::ivec2 cell) const {
+    return static_cast<std::size_t>(cell.y) * static_cast<std::size_t>(cells.x) +
+           static_cast<std::size_t>(cell.x);
+  }
+
   [[nodiscard]] glm::ivec2 cell_of(glm::dvec3 at) const {
     const glm::ivec2 cell{static_cast<int>(std::floor((at.x - low_mm.x) / cell_mm)),
                           static_cast<int>(std::floor((at.y - low_mm.y) / cell_mm))};
@@ -76,8 +81,7 @@ Grid fill_grid(const std::vector<Ball>& balls, glm::dvec2 size, double range_mm)
     for (int j = from.y; j <= to.y; ++j) {
       for (int i = from.x; i <= to.x; ++i) {
         const glm::ivec2 cell = grid.cell_of(at + glm::dvec3(i * size.x, j * size.y, 0));
-        grid.copies[static_cast<std::size_t>(cell.y * grid.cells.x + cell.x)].push_back(
-            {static_cast<std::uint32_t>(v), {i, j}});
+        grid.copies[grid.slot(cell)].push_back({static_cast<std::uint32_t>(v), {i, j}});
       }
     }
   }
@@ -232,29 +236,29 @@ std::vector<NearPair> near_pairs(const YarnBody& body, double margin_mm) {
     balls.push_back(ball_of(body, u));
     largest = std::max(largest, balls.back().radius_mm);
   }
-  const double range = 2 * largest + margin_mm;
-  const Grid grid = fill_grid(balls, body.size_mm, range);
+  const Grid grid = fill_grid(balls, body.size_mm, 2 * largest + margin_mm);
   std::vector<NearPair> pairs;
   for (std::uint32_t u = 0; u < balls.size(); ++u) {
     const glm::ivec2 home = tile_of(balls[u].middle_mm, body.size_mm);
     const glm::dvec3 to_home{home.x * body.size_mm.x, home.y * body.size_mm.y, 0};
     const glm::ivec2 cell = grid.cell_of(balls[u].middle_mm - to_home);
+    const auto add = [&](const Copy& copy) {
+      const std::uint32_t v = copy.piece;
+      const glm::ivec2 tile = copy.tile + home;
+      if (v < u || (v == u && (tile.y < 0 || (tile.y == 0 && tile.x <= 0)))) {
+        return;  // the same pair, seen from its other end
+      }
+      const glm::dvec3 shift{tile.x * body.size_mm.x, tile.y * body.size_mm.y, 0};
+      const double reach = balls[u].radius_mm + balls[v].radius_mm + margin_mm;
+      const glm::dvec3 apart = balls[v].middle_mm + shift - balls[u].middle_mm;
+      if (glm::dot(apart, apart) <= reach * reach && !joined(body, u, v, tile)) {
+        pairs.push_back({u, v, shift});
+      }
+    };
     for (int cy = std::max(0, cell.y - 1); cy <= std::min(grid.cells.y - 1, cell.y + 1); ++cy) {
       for (int cx = std::max(0, cell.x - 1); cx <= std::min(grid.cells.x - 1, cell.x + 1); ++cx) {
-        for (const Copy& copy : grid.copies[static_cast<std::size_t>(cy * grid.cells.x + cx)]) {
-          const std::uint32_t v = copy.piece;
-          const glm::ivec2 tile = copy.tile + home;
-          if (v < u || (v == u && (tile.y < 0 || (tile.y == 0 && tile.x <= 0)))) {
-            continue;
-          }
-          const glm::dvec3 shift{tile.x * body.size_mm.x, tile.y * body.size_mm.y, 0};
-          const double reach = balls[u].radius_mm + balls[v].radius_mm + margin_mm;
-          const glm::dvec3 apart = balls[v].middle_mm + shift - balls[u].middle_mm;
-          if (glm::dot(apart, apart) > reach * reach || joined(body, u, v, tile)) {
-            continue;
-          }
-          pairs.push_back({u, v, shift});
-        }
+        const std::vector<Copy>& copies = grid.copies[grid.slot({cx, cy})];
+        std::for_each(copies.begin(), copies.end(), add);
       }
     }
   }
