@@ -93,7 +93,7 @@ std::string preset_text(const std::string& preset) {
   if (const auto text = fabric::embedded_text("fabric", preset)) {
     return std::string(*text);
   }
-  std::vector<std::string> known;
+  std::vector<std::string> known{"silk", "satin", "shot_silk", "cotton", "polyester", "rayon"};
   for (const std::string& name : fabric::embedded_names("fabric")) {
     if (name.starts_with(preset + "_")) {
       return std::string(*fabric::embedded_text("fabric", name));

@@ -52,7 +52,8 @@ void inline_files(v1::FabricDescription& description, const std::filesystem::pat
 }
 
 // Takes the sett that is not set from the draft, and says where the draft is broken.
-void sett_from_draft(v1::Weave& weave, const std::string& wif_name, Mistakes& mistakes) {
+void sett_from_draft(v1::Weave& weave, const std::string& wif_name, const std::string& path,
+                     Mistakes& mistakes) {
   if (!weave.has_wif_text()) {
     return;
   }
@@ -65,7 +66,7 @@ void sett_from_draft(v1::Weave& weave, const std::string& wif_name, Mistakes& mi
       weave.set_picks_per_cm(10 / draft.weft.spacing_mm);
     }
   } catch (const core::Error& error) {
-    mistakes.push_back({"weave.wif_file", error.what()});
+    mistakes.push_back({path, error.what()});
   }
 }
 
@@ -236,10 +237,12 @@ v1::FabricDescription parse_description(std::string_view text, const std::string
   }
   v1::FabricDescription description = written->message();
   Mistakes mistakes;
-  const std::string wif_name = description.weave().wif_file();
+  const bool has_file = description.weave().has_wif_file();
+  const std::string wif_name = has_file ? description.weave().wif_file() : "the draft";
   inline_files(description, folder, mistakes);
   if (description.has_weave()) {
-    sett_from_draft(*description.mutable_weave(), wif_name, mistakes);
+    sett_from_draft(*description.mutable_weave(), wif_name,
+                    has_file ? "weave.wif_file" : "weave.wif_text", mistakes);
   }
   fill_yarn_presets(description, mistakes);
   fill_material_presets(description, mistakes);

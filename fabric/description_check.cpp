@@ -51,8 +51,9 @@ void check_yarn_numbers(const FieldChecker& check, const v1::Yarn& yarn) {
   check.number("plies", yarn.plies(), {1, 64});
   check.number("fibres_per_ply", yarn.fibres_per_ply(), {1, 10000});
   check.needed("yarn_radius_mm", yarn.yarn_radius_mm(), {0.0005, 20});
-  if (yarn.yarn_radius_mm() > 0 && std::isfinite(yarn.yarn_radius_mm())) {
-    check.number("fibre_radius_mm", yarn.fibre_radius_mm(), {0.0001, yarn.yarn_radius_mm()});
+  // 0 stands for a default that the other numbers, which are wrong, did not give.
+  if (yarn.yarn_radius_mm() > 0 && yarn.fibre_radius_mm() != 0) {
+    check.number("fibre_radius_mm", yarn.fibre_radius_mm(), {0.00001, yarn.yarn_radius_mm()});
   }
   check.number("ply_twist_per_cm", yarn.ply_twist_per_cm(), {-1000, 1000});
   check.number("fibre_twist_per_cm", yarn.fibre_twist_per_cm(), {-1000, 1000});

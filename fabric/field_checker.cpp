@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fabric/description_check.h"
+#include "fabric/presets.h"
 
 namespace weft::fabric {
 namespace {
@@ -67,10 +68,17 @@ void FieldChecker::name(const std::string& field, const std::string& value) cons
 
 void FieldChecker::known(const std::string& field, const std::string& value,
                          const std::vector<std::string>& known, const std::string& kind) const {
+  if (std::find(known.begin(), known.end(), value) != known.end() && !value.empty()) {
+    return;
+  }
+  std::vector<std::string> possible = known;
+  for (const std::string& preset : embedded_names(kind)) {
+    possible.push_back(preset);
+  }
   if (value.empty()) {
-    wrong(field, field + " is missing; name one of the " + kind + "s" + suggestion("", known));
-  } else if (std::find(known.begin(), known.end(), value) == known.end()) {
-    wrong(field, "there is no " + kind + " " + in_quotes(value) + suggestion(value, known));
+    wrong(field, field + " is missing; name one of the " + kind + "s" + suggestion("", possible));
+  } else {
+    wrong(field, "there is no " + kind + " " + in_quotes(value) + suggestion(value, possible));
   }
 }
 

@@ -35,7 +35,7 @@ class FieldChecker {
 
   // A name that is well formed.
   void name(const std::string& field, const std::string& value) const;
-  // A name that `known` has.
+  // A name that `known` has; `kind`, "yarn" or "material", may also be one of its presets.
   void known(const std::string& field, const std::string& value,
              const std::vector<std::string>& known, const std::string& kind) const;
 

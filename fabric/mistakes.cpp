@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstddef>
+#include <cstdio>
+#include <cstdlib>
 
 namespace weft::fabric {
 namespace {
@@ -33,7 +34,7 @@ std::string suggestion(std::string_view name, const std::vector<std::string>& kn
   const std::string* nearest = nullptr;
   std::size_t least = std::min(name.size(), kLongestName) / 3 + 2;
   for (const std::string& candidate : known) {
-    if (name.size() <= kLongestName && edit_distance(name, candidate) < least) {
+    if (!name.empty() && name.size() <= kLongestName && edit_distance(name, candidate) < least) {
       least = edit_distance(name, candidate);
       nearest = &candidate;
     }
@@ -59,9 +60,12 @@ std::string in_quotes(std::string_view text) {
 }
 
 std::string shortest(double value) {
-  std::array<char, 32> digits{};
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  return {digits.data(), end};
+  std::array<char, 40> digits{};
+  (void)std::snprintf(digits.data(), digits.size(), "%.6g", value);
+  if (std::strtod(digits.data(), nullptr) != value && value == value) {
+    (void)std::snprintf(digits.data(), digits.size(), "%.17g", value);
+  }
+  return digits.data();
 }
 
 }  // namespace weft::fabric

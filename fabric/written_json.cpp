@@ -89,7 +89,8 @@ bool clean_value(const FieldDescriptor& field, const std::string& path, json& va
   const std::string right = wanted(field, value);
   if (!right.empty()) {
     mistakes.push_back(
-        {path, in_quotes(value.dump(-1, ' ', true)) + " does not fit; " + right + " is needed"});
+        {path, in_quotes(value.is_string() ? value.get<std::string>() : value.dump()) +
+                   " does not fit; " + right + " is needed"});
     return false;
   }
   if (field.message_type() != nullptr) {

@@ -75,6 +75,7 @@ std::string mended(const std::string& message) {
 
 class TextCollector : public google::protobuf::io::ErrorCollector {
  public:
+  explicit TextCollector(std::string_view text) : text_(text) {}
   void AddError(int line, google::protobuf::io::ColumnNumber column,
                 const std::string& message) override {
     add(line, column, message);
@@ -91,10 +92,33 @@ class TextCollector : public google::protobuf::io::ErrorCollector {
  private:
   void add(int line, int column, const std::string& message) {
     constexpr std::size_t kMost = 100;
-    if (all_.size() < kMost) {
-      all_.push_back({{std::max(line, 0), std::max(column, 0)}, mended(message)});
+    if (all_.size() >= kMost) {
+      return;
     }
+    Place place{std::max(line, 0), std::max(column, 0)};
+    // The parser has read on when it finds an unknown field or value: go back to it.
+    for (const char* before : {"has no field named \"", "enumeration value of \""}) {
+      const std::string word = between(message, before, "\"");
+      const std::size_t at =
+          line_of(place.line).rfind(word, static_cast<std::size_t>(place.column));
+      if (!word.empty() && at != std::string_view::npos) {
+        place.column = static_cast<int>(at);
+      }
+    }
+    all_.push_back({place, mended(message)});
   }
+
+  [[nodiscard]] std::string_view line_of(int number) const {
+    std::size_t start = 0;
+    for (int line = 0; line < number && start != std::string_view::npos; ++line) {
+      start = text_.find('\n', start);
+      start = start == std::string_view::npos ? start : start + 1;
+    }
+    return start == std::string_view::npos ? std::string_view()
+                                           : text_.substr(start, text_.find('\n', start) - start);
+  }
+
+  std::string_view text_;
 
   std::vector<std::pair<Place, std::string>> all_;
   bool failed_ = false;
@@ -102,7 +126,8 @@ class TextCollector : public google::protobuf::io::ErrorCollector {
 
 class TextDescription : public WrittenDescription {
  public:
-  TextDescription(std::string_view text, std::string name) : name_(std::move(name)) {
+  TextDescription(std::string_view text, std::string name)
+      : name_(std::move(name)), collector_(text) {
     constexpr int kDeepest = 32;
     TextFormat::Parser parser;
     parser.RecordErrorsTo(&collector_);
