@@ -29,7 +29,7 @@ namespace {
 // Beyond these a crop or fewer fibres are offered.
 constexpr std::uint64_t kManySegments = 2'000'000;
 constexpr double kManyCoreSeconds = 8 * 3600;
-constexpr std::uint32_t kOfferedThreads = 32;
+constexpr std::uint32_t kOfferedThreads = 24;
 
 struct ImportCommand {
   std::string draft;
@@ -64,7 +64,7 @@ Range parse_range(const std::string& text, const std::string& flag) {
     throw core::Error(core::Code::kInvalidArgument,
                       flag + " " + text +
                           " is no range; write A:N for N threads from A on, "
-                          "counted from 1, such as 1:32");
+                          "counted from 1, such as 1:24");
   }
   return range;
 }

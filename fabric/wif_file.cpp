@@ -236,26 +236,30 @@ void WifFile::read_line(std::string_view line, std::uint32_t number) {
       {normalized(line.substr(0, equals)), std::string(trimmed(value)), number});
 }
 
+void WifFile::keep_entry(WifSection& section, std::map<std::string, std::size_t>& places,
+                         WifEntry entry) {
+  const auto [place, fresh] = places.try_emplace(entry.key, section.entries.size());
+  if (fresh || entry.key.empty()) {
+    section.entries.push_back(std::move(entry));
+    return;
+  }
+  WifEntry& before = section.entries[place->second];
+  if (before.value != entry.value && !is_free_text(section.name)) {
+    note(bracketed(section.name) + " " + entry.key + " stands twice, at lines " +
+         std::to_string(before.line) + " and " + std::to_string(entry.line) +
+         "; the last one counts");
+  }
+  before = std::move(entry);
+}
+
 void WifFile::merge_repeated_keys() {
   for (WifSection& section : sections_) {
+    std::vector<WifEntry> written;
+    written.swap(section.entries);
     std::map<std::string, std::size_t> places;
-    std::vector<WifEntry> kept;
-    kept.reserve(section.entries.size());
-    for (WifEntry& entry : section.entries) {
-      const auto [place, fresh] = places.try_emplace(entry.key, kept.size());
-      if (fresh || entry.key.empty()) {
-        kept.push_back(std::move(entry));
-      } else {
-        WifEntry& before = kept[place->second];
-        if (before.value != entry.value && !is_free_text(section.name)) {
-          note(bracketed(section.name) + " " + entry.key + " stands twice, at lines " +
-               std::to_string(before.line) + " and " + std::to_string(entry.line) +
-               "; the last one counts");
-        }
-        before = std::move(entry);
-      }
+    for (WifEntry& entry : written) {
+      keep_entry(section, places, std::move(entry));
     }
-    section.entries = std::move(kept);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -72,6 +73,9 @@ class WifFile {
   void read_line(std::string_view line, std::uint32_t number);
   void open_section(std::string_view line, std::uint32_t number);
   void merge_repeated_keys();
+  // Appends an entry to its section, or replaces the one of the same key; `places` says where each
+  // key stands.
+  void keep_entry(WifSection& section, std::map<std::string, std::size_t>& places, WifEntry entry);
 
   std::string name_;
   std::vector<WifSection> sections_;

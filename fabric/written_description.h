@@ -16,6 +16,8 @@ class WrittenDescription {
   WrittenDescription() = default;
   WrittenDescription(const WrittenDescription&) = delete;
   WrittenDescription& operator=(const WrittenDescription&) = delete;
+  WrittenDescription(WrittenDescription&&) = delete;
+  WrittenDescription& operator=(WrittenDescription&&) = delete;
   virtual ~WrittenDescription() = default;
 
   [[nodiscard]] const v1::FabricDescription& message() const { return message_; }

@@ -101,11 +101,13 @@ bool clean_value(const FieldDescriptor& field, const std::string& path, json& va
 
 void clean(const Descriptor& type, const std::string& path, json& value, Mistakes& mistakes) {
   json kept = json::object();
-  for (auto& [key, member] : value.items()) {
-    const std::string here = path.empty() ? key : path + "." + key;
+  for (const auto& [key, member] : value.items()) {
+    std::string here = path;
+    here.append(path.empty() ? "" : ".").append(key);
     const FieldDescriptor* field = field_called(type, key);
     if (field == nullptr) {
       std::vector<std::string> known;
+      known.reserve(static_cast<std::size_t>(type.field_count()));
       for (int f = 0; f < type.field_count(); ++f) {
         known.push_back(type.field(f)->name());
       }
@@ -113,7 +115,8 @@ void clean(const Descriptor& type, const std::string& path, json& value, Mistake
           {here, in_quotes(key) + " is no field of " + type.name() + suggestion(key, known)});
       continue;
     }
-    const std::string named = path.empty() ? field->name() : path + "." + field->name();
+    std::string named = path;
+    named.append(path.empty() ? "" : ".").append(field->name());
     if (member.is_null()) {
       continue;
     }

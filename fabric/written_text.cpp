@@ -60,6 +60,7 @@ std::string mended(const std::string& message) {
   if (const Descriptor* type = message_type(between(message, "Message type \"", "\""));
       type != nullptr && !field.empty()) {
     std::vector<std::string> known;
+    known.reserve(static_cast<std::size_t>(type->field_count()));
     for (int f = 0; f < type->field_count(); ++f) {
       known.push_back(type->field(f)->name());
     }
