@@ -97,7 +97,7 @@ def main():
             for term, flags in terms.items():
                 cells = []
                 for sharpness in [None] + SHARPNESS:
-                    scene = scene_text(about["tile_mm"], VIEWS[view], sharpness, arguments.size,
+                    scene = scene_text(about["size_mm"], VIEWS[view], sharpness, arguments.size,
                                        arguments.spp)
                     key = f"{fabric.stem}-{view}-{term}-{sharpness or 'directional'}"
                     ours = render(arguments.out, fabric, scene, key + "-precomputed",
@@ -105,7 +105,8 @@ def main():
                     theirs = render(arguments.out, fabric, scene, key + "-path",
                                     ["--integrator", "path", "--local", *flags])
                     error, signed, noise = relative_error(
-                        ours["mean"], theirs["mean"], theirs["standard_error"])
+                        ours["cloth_mean"], theirs["cloth_mean"],
+                        theirs["cloth_standard_error"])
                     cells.append(f"{error:.1f} ({signed:+.1f}) ± {noise:.1f}")
                 print(f"| {fabric.stem} | {view} | {term} | " + " | ".join(cells) + " |",
                       flush=True)
