@@ -33,6 +33,11 @@ int main(int argc, char** argv) {
   cli::add_verify(app);
   cli::add_render(app);
   cli::add_compare(app);
+  const auto is_named = [argv](const CLI::App* command) { return command->check_name(argv[1]); };
+  if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
+    std::fprintf(stderr, "weft: there is no command '%s'; weft --help lists them\n", argv[1]);
+    return cli::kExitWrongUse;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
