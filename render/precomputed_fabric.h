@@ -21,7 +21,7 @@ struct PrecomputedSettings {
   // 2017, section 5.2.2).
   float blend_low = 100;
   float blend_high = 200;
-  int gamma_method = shading::kGammaGl12;  // or kGammaClosed, kGammaHybrid
+  int gamma_method = shading::kGammaHybrid;  // or kGammaClosed, kGammaGl12
 };
 
 // Where an eye ray met a fibre, prepared for any number of lights. All directions of this header
