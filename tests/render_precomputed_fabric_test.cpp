@@ -154,8 +154,8 @@ TEST(PrecomputedFabric, OpenSegmentsShadeAsIfAlone) {
     const glm::vec3 expected = alone.evaluate_cos(frame * towards, frame * kOmegaO);
     EXPECT_EQ(fabric().single_directional(at, towards), expected);
     // At sharpness 1000 the Gaussian's own width still matters, its horizon does not.
-    const glm::vec3 gamma = shading::gamma_integral(alone.lobes(), {frame * towards, 1000},
-                                                    frame * kOmegaO, shading::kGammaGl12);
+    const glm::vec3 gamma = shading::gamma_integral(
+        alone.lobes(), {frame * towards, 1000}, frame * kOmegaO, fabric().settings().gamma_method);
     const glm::vec3 sg = fabric().single_sg(at, {towards, 1000});
     EXPECT_NEAR(sg.y, gamma.y / shading::sg_mass(1000), 1e-5 * sg.y);
   }
