@@ -12,7 +12,7 @@
 #include "cli/output_file.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "fabric/mistakes.h"
+#include "core/mistakes.h"
 #include "fabric/presets.h"
 
 namespace weft::cli {
@@ -106,8 +106,8 @@ std::string preset_text(const std::string& preset) {
     }
     known.push_back(name);
   }
-  throw core::Error(core::Code::kNotFound, "there is no preset " + fabric::in_quotes(preset) +
-                                               fabric::suggestion(preset, known) +
+  throw core::Error(core::Code::kNotFound, "there is no preset " + core::in_quotes(preset) +
+                                               core::suggestion(preset, known) +
                                                "; weft new --list shows them all");
 }
 

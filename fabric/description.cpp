@@ -14,7 +14,7 @@
 #include "fabric/presets.h"
 #include "fabric/wif.h"
 #include "fabric/wif_file.h"
-#include "fabric/written_description.h"
+#include "proto/document.h"
 
 namespace weft::fabric {
 namespace {
@@ -24,7 +24,7 @@ constexpr std::uint64_t kMaxCurvesBytes = std::uint64_t{64} << 20;
 
 // Reads a file that the description names; on failure lists the mistake and returns nothing.
 std::string inlined(const std::string& file, const std::filesystem::path& folder,
-                    std::uint64_t limit_bytes, const std::string& path, Mistakes& mistakes) {
+                    std::uint64_t limit_bytes, const std::string& path, core::Mistakes& mistakes) {
   try {
     return core::read_file(folder / file, limit_bytes);
   } catch (const core::Error& error) {
@@ -34,7 +34,7 @@ std::string inlined(const std::string& file, const std::filesystem::path& folder
 }
 
 void inline_files(v1::FabricDescription& description, const std::filesystem::path& folder,
-                  Mistakes& mistakes) {
+                  core::Mistakes& mistakes) {
   if (description.weave().has_wif_file()) {
     const std::string file = description.weave().wif_file();
     std::string text = inlined(file, folder, kMaxWifBytes, "weave.wif_file", mistakes);
@@ -53,7 +53,7 @@ void inline_files(v1::FabricDescription& description, const std::filesystem::pat
 
 // Takes the sett that is not set from the draft, and says where the draft is broken.
 void sett_from_draft(v1::Weave& weave, const std::string& wif_name, const std::string& path,
-                     Mistakes& mistakes) {
+                     core::Mistakes& mistakes) {
   if (!weave.has_wif_text()) {
     return;
   }
@@ -94,7 +94,7 @@ bool has_name(const Messages& messages, const std::string& name) {
                      [&](const auto& message) { return message.name() == name; });
 }
 
-void fill_yarn_presets(v1::FabricDescription& description, Mistakes& mistakes) {
+void fill_yarn_presets(v1::FabricDescription& description, core::Mistakes& mistakes) {
   for (int y = 0; y < description.yarns_size(); ++y) {
     v1::Yarn& yarn = *description.mutable_yarns(y);
     if (yarn.preset().empty()) {
@@ -104,8 +104,8 @@ void fill_yarn_presets(v1::FabricDescription& description, Mistakes& mistakes) {
       fill_from_preset(yarn, *preset);
     } else {
       mistakes.push_back({"yarns[" + std::to_string(y) + "].preset",
-                          "there is no yarn preset " + in_quotes(yarn.preset()) +
-                              suggestion(yarn.preset(), embedded_names("yarn"))});
+                          "there is no yarn preset " + core::in_quotes(yarn.preset()) +
+                              core::suggestion(yarn.preset(), embedded_names("yarn"))});
     }
   }
   for (const std::string& name : yarns_named(description)) {
@@ -117,7 +117,7 @@ void fill_yarn_presets(v1::FabricDescription& description, Mistakes& mistakes) {
   }
 }
 
-void fill_material_presets(v1::FabricDescription& description, Mistakes& mistakes) {
+void fill_material_presets(v1::FabricDescription& description, core::Mistakes& mistakes) {
   for (int m = 0; m < description.materials_size(); ++m) {
     v1::Material& material = *description.mutable_materials(m);
     if (material.preset().empty()) {
@@ -127,8 +127,8 @@ void fill_material_presets(v1::FabricDescription& description, Mistakes& mistake
       fill_from_preset(material, *preset);
     } else {
       mistakes.push_back({"materials[" + std::to_string(m) + "].preset",
-                          "there is no material preset " + in_quotes(material.preset()) +
-                              suggestion(material.preset(), embedded_names("material"))});
+                          "there is no material preset " + core::in_quotes(material.preset()) +
+                              core::suggestion(material.preset(), embedded_names("material"))});
     }
   }
   const auto add = [&](const std::string& name) {
@@ -209,13 +209,6 @@ void reduce_weave(v1::Weave& weave, const v1::FabricDescription& description) {
   weave = std::move(reduced);
 }
 
-bool is_json(const std::string& name, std::string_view text) {
-  const std::string ending = std::filesystem::path(name).extension().string();
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  return ending == ".json" ||
-         (ending.empty() && first != std::string_view::npos && text[first] == '{');
-}
-
 }  // namespace
 
 v1::FabricDescription load_description(const std::filesystem::path& path, v1::Quality quality) {
@@ -225,9 +218,9 @@ v1::FabricDescription load_description(const std::filesystem::path& path, v1::Qu
 
 v1::FabricDescription parse_description(std::string_view text, const std::string& name,
                                         const std::filesystem::path& folder, v1::Quality quality) {
-  const std::unique_ptr<WrittenDescription> written =
-      is_json(name, text) ? read_json(text, name) : read_text(text, name);
-  const auto refuse_if = [&](const Mistakes& mistakes, core::Code code) {
+  v1::FabricDescription description;
+  const std::unique_ptr<v1::Document> written = v1::read_document(text, name, description);
+  const auto refuse_if = [&](const core::Mistakes& mistakes, core::Code code) {
     if (const std::string listing = written->listing(mistakes); !listing.empty()) {
       throw core::Error(code, listing);
     }
@@ -235,8 +228,7 @@ v1::FabricDescription parse_description(std::string_view text, const std::string
   if (written->unreadable()) {
     refuse_if({}, core::Code::kInvalidArgument);
   }
-  v1::FabricDescription description = written->message();
-  Mistakes mistakes;
+  core::Mistakes mistakes;
   const bool has_file = description.weave().has_wif_file();
   const std::string wif_name = has_file ? description.weave().wif_file() : "the draft";
   inline_files(description, folder, mistakes);
@@ -251,7 +243,7 @@ v1::FabricDescription parse_description(std::string_view text, const std::string
   }
   expand_defaults(description);
   const bool draft_is_right = mistakes.empty();
-  for (Mistake& mistake : check_fields(description)) {
+  for (core::Mistake& mistake : check_fields(description)) {
     // A draft that could not be read is listed once, and so is a preset that there is none of.
     const bool follows = !draft_is_right && mistake.path == "weave";
     if (!follows) {
@@ -273,7 +265,7 @@ void check_description(const v1::FabricDescription& description) {
   v1::FabricDescription canonical = description;
   expand_defaults(canonical);
   std::string listing;
-  for (const Mistake& mistake : check_fields(description)) {
+  for (const core::Mistake& mistake : check_fields(description)) {
     listing.append(listing.empty() ? "" : "\n").append(mistake.path);
     listing.append(mistake.path.empty() ? "" : ": ").append(mistake.message);
   }

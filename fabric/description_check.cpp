@@ -42,8 +42,8 @@ void check_migration(const FieldChecker& check, const v1::Migration& migration) 
   check.number("density_power", migration.density_power(), {0, 100});
   check.number("core", migration.core(), {0, 0.99});
   if (migration.r_min() > migration.r_max()) {
-    check.wrong("r_min", "r_min " + shortest(migration.r_min()) + " is above r_max " +
-                             shortest(migration.r_max()) + "; exchange them");
+    check.wrong("r_min", "r_min " + core::shortest(migration.r_min()) + " is above r_max " +
+                             core::shortest(migration.r_max()) + "; exchange them");
   }
 }
 
@@ -71,7 +71,7 @@ void check_yarn(const FieldChecker& check, const v1::Yarn& yarn,
                 const std::vector<std::string>& materials) {
   check.name("name", yarn.name());
   check.known("material", yarn.material(), materials, "material");
-  Mistakes in_numbers;
+  core::Mistakes in_numbers;
   check_yarn_numbers(FieldChecker(in_numbers, ""), yarn);
   if (!in_numbers.empty()) {
     check_yarn_numbers(check, yarn);
@@ -113,7 +113,7 @@ void check_matrix(const FieldChecker& check, const v1::Matrix& matrix) {
     const std::size_t bad = row.find_first_not_of("X1.0");
     if (bad != std::string::npos) {
       check.at("rows", p).wrong("", "character " + std::to_string(bad + 1) + " of the row is " +
-                                        in_quotes(row.substr(bad, 1)) +
+                                        core::in_quotes(row.substr(bad, 1)) +
                                         "; use X or 1 where the warp is on top, . or 0 elsewhere");
     }
     if (row.size() != matrix.rows(0).size()) {
@@ -147,7 +147,7 @@ void check_weave(const FieldChecker& check, const v1::Weave& weave,
     known(at, "warp_yarn", entry.warp_yarn());
     known(at, "weft_yarn", entry.weft_yarn());
   }
-  Mistakes in_matrix;
+  core::Mistakes in_matrix;
   check_matrix(FieldChecker(in_matrix, ""), weave.matrix());
   if (!in_matrix.empty()) {
     check_matrix(check.at("matrix"), weave.matrix());
@@ -178,7 +178,7 @@ void check_fibres(const FieldChecker& check, const v1::ExplicitFibres& given,
     }
     for (const double value : fibre.points_mm()) {
       if (!std::isfinite(value) || std::abs(value) > 10000) {
-        at.wrong("points_mm", "points_mm has the number " + shortest(value) +
+        at.wrong("points_mm", "points_mm has the number " + core::shortest(value) +
                                   "; numbers from -10000 to 10000 are needed");
         break;
       }
@@ -189,7 +189,7 @@ void check_fibres(const FieldChecker& check, const v1::ExplicitFibres& given,
 void check_structure(const FieldChecker& check, const v1::FabricDescription& description) {
   const std::vector<std::string> yarns = names_of(description.yarns());
   if (description.has_weave()) {
-    Mistakes so_far;
+    core::Mistakes so_far;
     FieldChecker probe(so_far, "");
     check_weave(probe.at("weave"), description.weave(), yarns, false);
     check_weave(check.at("weave"), description.weave(), yarns, so_far.empty());
@@ -257,7 +257,7 @@ void check_unique(const FieldChecker& check, const std::string& field, const Mes
   for (int i = 0; i < messages.size(); ++i) {
     const auto [place, fresh] = first.try_emplace(messages[i].name(), i);
     if (!fresh && !messages[i].name().empty()) {
-      check.at(field, i).wrong("name", "the name " + in_quotes(messages[i].name()) +
+      check.at(field, i).wrong("name", "the name " + core::in_quotes(messages[i].name()) +
                                            " is taken by " + field + "[" +
                                            std::to_string(place->second) + "]; give another");
     }
@@ -266,8 +266,8 @@ void check_unique(const FieldChecker& check, const std::string& field, const Mes
 
 }  // namespace
 
-Mistakes check_fields(const v1::FabricDescription& description) {
-  Mistakes mistakes;
+core::Mistakes check_fields(const v1::FabricDescription& description) {
+  core::Mistakes mistakes;
   const FieldChecker check(mistakes, "");
   check.name("name", description.name());
   check_structure(check, description);

@@ -10,8 +10,8 @@ namespace weft::fabric {
 namespace {
 
 std::string allowed(const Bounds& bounds) {
-  return (bounds.open_low ? "a number above " : "a number from ") + shortest(bounds.low) +
-         (bounds.open_low ? " up to " : " to ") + shortest(bounds.high) + " is needed";
+  return (bounds.open_low ? "a number above " : "a number from ") + core::shortest(bounds.low) +
+         (bounds.open_low ? " up to " : " to ") + core::shortest(bounds.high) + " is needed";
 }
 
 bool within(double value, const Bounds& bounds) {
@@ -46,7 +46,7 @@ void FieldChecker::wrong(const std::string& field, const std::string& message) c
 
 void FieldChecker::number(const std::string& field, double value, const Bounds& bounds) const {
   if (!within(value, bounds)) {
-    wrong(field, field + " is " + shortest(value) + "; " + allowed(bounds));
+    wrong(field, field + " is " + core::shortest(value) + "; " + allowed(bounds));
   }
 }
 
@@ -62,7 +62,8 @@ void FieldChecker::name(const std::string& field, const std::string& value) cons
   if (value.empty()) {
     wrong(field, field + " is missing; give one of small letters, digits, _ and -");
   } else if (!is_name(value)) {
-    wrong(field, in_quotes(value) + " is no name; use small letters, digits, _ and -, at most 64");
+    wrong(field,
+          core::in_quotes(value) + " is no name; use small letters, digits, _ and -, at most 64");
   }
 }
 
@@ -76,9 +77,11 @@ void FieldChecker::known(const std::string& field, const std::string& value,
     possible.push_back(preset);
   }
   if (value.empty()) {
-    wrong(field, field + " is missing; name one of the " + kind + "s" + suggestion("", possible));
+    wrong(field,
+          field + " is missing; name one of the " + kind + "s" + core::suggestion("", possible));
   } else {
-    wrong(field, "there is no " + kind + " " + in_quotes(value) + suggestion(value, possible));
+    wrong(field,
+          "there is no " + kind + " " + core::in_quotes(value) + core::suggestion(value, possible));
   }
 }
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fabric/mistakes.h"
+#include "core/mistakes.h"
 
 namespace weft::fabric {
 
@@ -18,7 +18,7 @@ struct Bounds {
 // Collects the mistakes of one message of a description; `path` leads to the message.
 class FieldChecker {
  public:
-  FieldChecker(Mistakes& mistakes, std::string path)
+  FieldChecker(core::Mistakes& mistakes, std::string path)
       : mistakes_(mistakes), path_(std::move(path)) {}
 
   // A checker of a field that is a message, and of one of a list.
@@ -40,7 +40,7 @@ class FieldChecker {
              const std::vector<std::string>& known, const std::string& kind) const;
 
  private:
-  Mistakes& mistakes_;
+  core::Mistakes& mistakes_;
   std::string path_;
 };
 

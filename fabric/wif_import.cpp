@@ -8,7 +8,6 @@
 
 #include "fabric/description_check.h"
 #include "fabric/draft.h"
-#include "fabric/mistakes.h"
 
 namespace weft::fabric {
 namespace {

@@ -1,41 +1,55 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include <google/protobuf/message.h>
-#include <google/protobuf/text_format.h>
+
+#include "core/mistakes.h"
 
 namespace weft::v1 {
 
-// A message that a person wrote, and where in the file each field of it stands, so that every
-// mistake can be reported at its place: "file:line:column: what is wrong" for protobuf text,
-// "file: lights[0].sg.sharpness: what is wrong" for JSON.
+// A message that a person wrote: what was wrong with the writing, and where in the file each field
+// stands, so that every mistake can be reported at its place.
 class Document {
  public:
-  // Parses `text` into `message`, which is cleared first: JSON when `name` ends in .json, else
-  // protobuf text. `name` stands for the file in messages. Throws core::Error(kInvalidArgument)
-  // when the text is neither, has unknown fields or numbers that are not finite; the message says
-  // where, and which fields there are.
-  Document(std::string_view text, std::string name, google::protobuf::Message& message);
+  Document() = default;
+  Document(const Document&) = delete;
+  Document& operator=(const Document&) = delete;
+  Document(Document&&) = delete;
+  Document& operator=(Document&&) = delete;
+  virtual ~Document() = default;
 
-  // Notes a mistake at a field, named by its path: "lights[0].sg.sharpness". A field that is not
-  // set is reported where the message around it begins. `what` says what is wrong, then what would
-  // be right.
-  void complain(const std::string& path, const std::string& what);
+  // True when nothing of the message can be relied on: mistakes of meaning are not worth listing.
+  [[nodiscard]] bool unreadable() const { return unreadable_; }
 
-  // Throws core::Error(kInvalidArgument) with all mistakes noted so far, one per line, if any.
-  void throw_if_wrong() const;
+  // Whether places are the paths of fields rather than lines and columns.
+  [[nodiscard]] virtual bool names_fields() const = 0;
 
- private:
-  [[nodiscard]] std::string place(const std::string& path) const;
-  void refuse_non_finite(const google::protobuf::Message& message, const std::string& path);
+  // All mistakes, those of writing and `further` ones, one per line in the order of the file, each
+  // with its place. A field that is not written stands where the message round it begins. Empty
+  // when there are none.
+  [[nodiscard]] virtual std::string listing(const core::Mistakes& further) const = 0;
 
-  std::string name_;
-  bool is_json_;
-  const google::protobuf::Descriptor* descriptor_;
-  google::protobuf::TextFormat::ParseInfoTree places_;
-  std::string mistakes_;
+ protected:
+  bool unreadable_ = false;
 };
+
+// Parses `text` into `message`, which is cleared first: JSON when `name` ends in .json, or has no
+// ending and the text begins with a brace, else protobuf text. `name` stands for the file in
+// messages. Never throws for what the text holds: ask the document.
+[[nodiscard]] std::unique_ptr<Document> read_document(std::string_view text,
+                                                      const std::string& name,
+                                                      google::protobuf::Message& message);
+
+// Protobuf text format: places are "name:line:column". Unknown fields are mistakes and are skipped.
+[[nodiscard]] std::unique_ptr<Document> read_text(std::string_view text, const std::string& name,
+                                                  google::protobuf::Message& message);
+
+// JSON: places are "name: field.path", or "name:line:column" where the text is no JSON at all.
+// Unknown fields and values of the wrong kind are mistakes and are skipped.
+[[nodiscard]] std::unique_ptr<Document> read_json(std::string_view text, const std::string& name,
+                                                  google::protobuf::Message& message);
 
 }  // namespace weft::v1

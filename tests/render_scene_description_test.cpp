@@ -57,7 +57,7 @@ TEST(SceneDescription, JsonMistakesNameTheField) {
 
 TEST(SceneDescription, UnknownFieldsSayWhichThereAre) {
   const std::string message = complaint("camera { zoom: 3 }");
-  EXPECT_TRUE(says(message, "s.textproto:1:14:")) << message;
+  EXPECT_TRUE(says(message, "s.textproto:1:10:")) << message;
   EXPECT_TRUE(says(message, "look_at")) << message;
 }
 

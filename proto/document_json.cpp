@@ -1,14 +1,16 @@
+#include <algorithm>
+#include <cstdint>
 #include <limits>
-#include <memory>
 #include <utility>
+#include <vector>
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
-#include "fabric/written_description.h"
+#include "proto/document.h"
 
-namespace weft::fabric {
+namespace weft::v1 {
 namespace {
 
 using google::protobuf::Descriptor;
@@ -82,14 +84,14 @@ std::string wanted(const FieldDescriptor& field, const json& value) {
 }
 
 // Takes out of `value` what is no field of `type` or not of its field's kind, and lists it.
-void clean(const Descriptor& type, const std::string& path, json& value, Mistakes& mistakes);
+void clean(const Descriptor& type, const std::string& path, json& value, core::Mistakes& mistakes);
 
 bool clean_value(const FieldDescriptor& field, const std::string& path, json& value,
-                 Mistakes& mistakes) {
+                 core::Mistakes& mistakes) {
   const std::string right = wanted(field, value);
   if (!right.empty()) {
     mistakes.push_back(
-        {path, in_quotes(value.is_string() ? value.get<std::string>() : value.dump()) +
+        {path, core::in_quotes(value.is_string() ? value.get<std::string>() : value.dump()) +
                    " does not fit; " + right + " is needed"});
     return false;
   }
@@ -99,7 +101,7 @@ bool clean_value(const FieldDescriptor& field, const std::string& path, json& va
   return true;
 }
 
-void clean(const Descriptor& type, const std::string& path, json& value, Mistakes& mistakes) {
+void clean(const Descriptor& type, const std::string& path, json& value, core::Mistakes& mistakes) {
   json kept = json::object();
   for (const auto& [key, member] : value.items()) {
     std::string here = path;
@@ -111,8 +113,8 @@ void clean(const Descriptor& type, const std::string& path, json& value, Mistake
       for (int f = 0; f < type.field_count(); ++f) {
         known.push_back(type.field(f)->name());
       }
-      mistakes.push_back(
-          {here, in_quotes(key) + " is no field of " + type.name() + suggestion(key, known)});
+      mistakes.push_back({here, core::in_quotes(key) + " is no field of " + type.name() +
+                                    core::suggestion(key, known)});
       continue;
     }
     std::string named = path;
@@ -144,8 +146,8 @@ void clean(const Descriptor& type, const std::string& path, json& value, Mistake
   value = std::move(kept);
 }
 
-// Whether brackets are nested deeper than any description needs: parsing it would be safe, but not
-// everything that is done with a value afterwards.
+// Whether brackets are nested deeper than any message of ours needs: parsing it would be safe, but
+// not everything that is done with a value afterwards.
 bool too_deep(std::string_view text) {
   constexpr int kDeepest = 32;
   int depth = 0;
@@ -168,9 +170,11 @@ bool too_deep(std::string_view text) {
   return false;
 }
 
-class JsonDescription : public WrittenDescription {
+class JsonDocument : public Document {
  public:
-  JsonDescription(std::string_view text, std::string name) : name_(std::move(name)) {
+  JsonDocument(std::string_view text, std::string name, google::protobuf::Message& message)
+      : name_(std::move(name)) {
+    message.Clear();
     json value;
     if (too_deep(text)) {
       listing_ = name_ + ": brackets are nested deeper than 32; no description needs that";
@@ -196,28 +200,30 @@ class JsonDescription : public WrittenDescription {
       unreadable_ = true;
       return;
     }
-    Mistakes mistakes;
-    clean(*v1::FabricDescription::descriptor(), "", value, mistakes);
-    const auto status = google::protobuf::util::JsonStringToMessage(value.dump(), &message_);
+    core::Mistakes mistakes;
+    clean(*message.GetDescriptor(), "", value, mistakes);
+    const auto status = google::protobuf::util::JsonStringToMessage(value.dump(), &message);
     if (!status.ok()) {
       mistakes.push_back({"", status.message().as_string()});
       unreadable_ = true;
     }
-    for (const Mistake& mistake : mistakes) {
+    for (const core::Mistake& mistake : mistakes) {
       add(listing_, mistake);
     }
   }
 
-  [[nodiscard]] std::string listing(const Mistakes& further) const override {
+  [[nodiscard]] bool names_fields() const override { return true; }
+
+  [[nodiscard]] std::string listing(const core::Mistakes& further) const override {
     std::string lines = listing_;
-    for (const Mistake& mistake : further) {
+    for (const core::Mistake& mistake : further) {
       add(lines, mistake);
     }
     return lines;
   }
 
  private:
-  void add(std::string& lines, const Mistake& mistake) const {
+  void add(std::string& lines, const core::Mistake& mistake) const {
     lines.append(lines.empty() ? "" : "\n").append(name_).append(": ");
     lines.append(mistake.path).append(mistake.path.empty() ? "" : ": ").append(mistake.message);
   }
@@ -228,8 +234,9 @@ class JsonDescription : public WrittenDescription {
 
 }  // namespace
 
-std::unique_ptr<WrittenDescription> read_json(std::string_view text, const std::string& name) {
-  return std::make_unique<JsonDescription>(text, name);
+std::unique_ptr<Document> read_json(std::string_view text, const std::string& name,
+                                    google::protobuf::Message& message) {
+  return std::make_unique<JsonDocument>(text, name, message);
 }
 
-}  // namespace weft::fabric
+}  // namespace weft::v1

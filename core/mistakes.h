@@ -4,10 +4,10 @@
 #include <string_view>
 #include <vector>
 
-namespace weft::fabric {
+namespace weft::core {
 
-// One thing that is wrong with a description. `path` leads to the field, such as
-// "yarns[1].hairs.per_mm"; empty means the description as a whole.
+// One thing that is wrong with a written message. `path` leads to the field, such as
+// "yarns[1].hairs.per_mm"; empty means the message as a whole.
 struct Mistake {
   std::string path;
   std::string message;  // what is wrong; what would be right
@@ -25,4 +25,4 @@ using Mistakes = std::vector<Mistake>;
 // A number with as few digits as tell it apart: 0.05, 20, nan.
 [[nodiscard]] std::string shortest(double value);
 
-}  // namespace weft::fabric
+}  // namespace weft::core

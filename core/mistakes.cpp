@@ -1,4 +1,4 @@
-#include "fabric/mistakes.h"
+#include "core/mistakes.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-namespace weft::fabric {
+namespace weft::core {
 namespace {
 
 // Levenshtein's distance.
@@ -68,4 +68,4 @@ std::string shortest(double value) {
   return digits.data();
 }
 
-}  // namespace weft::fabric
+}  // namespace weft::core

@@ -1,21 +1,21 @@
 #include <algorithm>
 #include <cstdlib>
-#include <map>
-#include <memory>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/text_format.h>
 
-#include "fabric/written_description.h"
+#include "proto/document.h"
 
-namespace weft::fabric {
+namespace weft::v1 {
 namespace {
 
 using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
+using google::protobuf::FileDescriptor;
 using google::protobuf::TextFormat;
 
 struct Place {
@@ -33,15 +33,10 @@ std::string between(const std::string& text, const std::string& before, const st
   return end == std::string::npos ? "" : text.substr(start, end - start);
 }
 
-const Descriptor* message_type(const std::string& full_name) {
-  return v1::FabricDescription::descriptor()->file()->pool()->FindMessageTypeByName(full_name);
-}
-
 // The values that an enumeration field called `name` takes, wherever in the schema it is.
-std::string enum_values(const std::string& name) {
-  const auto* file = v1::FabricDescription::descriptor()->file();
-  for (int m = 0; m < file->message_type_count(); ++m) {
-    const FieldDescriptor* field = file->message_type(m)->FindFieldByName(name);
+std::string enum_values(const std::string& name, const FileDescriptor& schema) {
+  for (int m = 0; m < schema.message_type_count(); ++m) {
+    const FieldDescriptor* field = schema.message_type(m)->FindFieldByName(name);
     if (field == nullptr || field->enum_type() == nullptr) {
       continue;
     }
@@ -55,28 +50,31 @@ std::string enum_values(const std::string& name) {
 }
 
 // The parser's message with what would be right.
-std::string mended(const std::string& message) {
+std::string mended(const std::string& message, const FileDescriptor& schema) {
   const std::string field = between(message, "has no field named \"", "\"");
-  if (const Descriptor* type = message_type(between(message, "Message type \"", "\""));
+  if (const Descriptor* type =
+          schema.pool()->FindMessageTypeByName(between(message, "Message type \"", "\""));
       type != nullptr && !field.empty()) {
     std::vector<std::string> known;
     known.reserve(static_cast<std::size_t>(type->field_count()));
     for (int f = 0; f < type->field_count(); ++f) {
       known.push_back(type->field(f)->name());
     }
-    return in_quotes(field) + " is no field of " + type->name() + suggestion(field, known);
+    return core::in_quotes(field) + " is no field of " + type->name() +
+           core::suggestion(field, known);
   }
   if (message.starts_with("Unknown enumeration value")) {
     const std::string value = between(message, "value of \"", "\"");
     const std::string of = between(message, "for field \"", "\"");
-    return in_quotes(value) + " is no value of " + of + enum_values(of);
+    return core::in_quotes(value) + " is no value of " + of + enum_values(of, schema);
   }
   return message;
 }
 
 class TextCollector : public google::protobuf::io::ErrorCollector {
  public:
-  explicit TextCollector(std::string_view text) : text_(text) {}
+  TextCollector(std::string_view text, const FileDescriptor& schema)
+      : text_(text), schema_(schema) {}
   void AddError(int line, google::protobuf::io::ColumnNumber column,
                 const std::string& message) override {
     add(line, column, message);
@@ -106,7 +104,7 @@ class TextCollector : public google::protobuf::io::ErrorCollector {
         place.column = static_cast<int>(at);
       }
     }
-    all_.push_back({place, mended(message)});
+    all_.push_back({place, mended(message, schema_)});
   }
 
   [[nodiscard]] std::string_view line_of(int number) const {
@@ -119,31 +117,33 @@ class TextCollector : public google::protobuf::io::ErrorCollector {
                                            : text_.substr(start, text_.find('\n', start) - start);
   }
 
-  std::string_view text_;
-
+  std::string_view text_;  // only while parsing
+  const FileDescriptor& schema_;
   std::vector<std::pair<Place, std::string>> all_;
   bool failed_ = false;
 };
 
-class TextDescription : public WrittenDescription {
+class TextDocument : public Document {
  public:
-  TextDescription(std::string_view text, std::string name)
-      : name_(std::move(name)), collector_(text) {
+  TextDocument(std::string_view text, std::string name, google::protobuf::Message& message)
+      : name_(std::move(name)), type_(*message.GetDescriptor()), collector_(text, *type_.file()) {
     constexpr int kDeepest = 32;
     TextFormat::Parser parser;
     parser.RecordErrorsTo(&collector_);
     parser.WriteLocationsTo(&places_);
     parser.AllowUnknownField(true);
     parser.SetRecursionLimit(kDeepest);
-    unreadable_ = !parser.ParseFromString(std::string(text), &message_) || collector_.failed();
+    unreadable_ = !parser.ParseFromString(std::string(text), &message) || collector_.failed();
   }
 
-  [[nodiscard]] std::string listing(const Mistakes& further) const override {
+  [[nodiscard]] bool names_fields() const override { return false; }
+
+  [[nodiscard]] std::string listing(const core::Mistakes& further) const override {
     std::vector<std::tuple<int, int, std::string>> all;
     for (const auto& [place, message] : collector_.all()) {
       all.emplace_back(place.line, place.column, message);
     }
-    for (const Mistake& mistake : further) {
+    for (const core::Mistake& mistake : further) {
       const Place place = place_of(mistake.path);
       all.emplace_back(place.line, place.column, mistake.message);
     }
@@ -164,7 +164,7 @@ class TextDescription : public WrittenDescription {
   [[nodiscard]] Place place_of(const std::string& path) const {
     Place place;
     const TextFormat::ParseInfoTree* tree = &places_;
-    const Descriptor* type = v1::FabricDescription::descriptor();
+    const Descriptor* type = &type_;
     for (std::size_t at = 0; at < path.size() && tree != nullptr && type != nullptr;) {
       const std::size_t end = std::min(path.find('.', at), path.size());
       std::string step = path.substr(at, end - at);
@@ -191,14 +191,16 @@ class TextDescription : public WrittenDescription {
   }
 
   std::string name_;
+  const Descriptor& type_;
   TextCollector collector_;
   TextFormat::ParseInfoTree places_;
 };
 
 }  // namespace
 
-std::unique_ptr<WrittenDescription> read_text(std::string_view text, const std::string& name) {
-  return std::make_unique<TextDescription>(text, name);
+std::unique_ptr<Document> read_text(std::string_view text, const std::string& name,
+                                    google::protobuf::Message& message) {
+  return std::make_unique<TextDocument>(text, name, message);
 }
 
-}  // namespace weft::fabric
+}  // namespace weft::v1
