@@ -24,12 +24,12 @@ MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
 # Third-party header -> the files that alone include it.
 BEHIND = {
     r"hdf5\.h|H5.*\.h": {"storage/h5.h", "storage/h5.cpp"},
-    r"embree3/.*": {"transport/scene.cpp", "render/shell_scene.cpp"},
+    r"embree3/.*": {"transport/scene.cpp", "render/triangle_scene.cpp"},
     r"(OpenEXR/)?Imf.*": {"render/image.cpp"},
     r"png\.h": {"render/image.cpp", "render/png.cpp"},
     r"sqlite3\.h": {"coordinator/journal.h", "coordinator/journal.cpp", "coordinator/sqlite.cpp",
                     "coordinator/sqlite.h"},
-    r"tiny_obj_loader\.h": {"render/mesh.cpp"},
+    r"tiny_obj_loader\.h": {"render/obj_mesh.cpp"},
     r"openssl/.*": {"core/digest.cpp"},
     r"Random123/.*": {"core/random.h"},
 }
