@@ -86,7 +86,8 @@ void preview(const PreviewOptions& options) {
       fabric::load_description(options.fabric, parse_quality(options.quality));
   const fabric::TileEstimate estimate = fabric::estimate_tile(description);
   fabric::RelaxReport relaxed;
-  const fabric::Tile tile = fabric::build_tile(description, &relaxed);
+  fabric::UntangleReport untangled;
+  const fabric::Tile tile = fabric::build_tile(description, &relaxed, &untangled);
   const double build_seconds = stopwatch.seconds();
   draw(options, description, tile);
   const double seconds = stopwatch.seconds();
@@ -100,6 +101,8 @@ void preview(const PreviewOptions& options) {
                                     {"segments", tile.segment_count()},
                                     {"deepest_overlap_share", relaxed.overlap_share},
                                     {"relax_iterations", relaxed.iterations},
+                                    {"buried_share", untangled.buried_share},
+                                    {"untangle_iterations", untangled.iterations},
                                     {"memory_bytes", estimate.memory_bytes},
                                     {"build_seconds", build_seconds},
                                     {"seconds", seconds}};
@@ -114,6 +117,8 @@ void preview(const PreviewOptions& options) {
               format_bytes(estimate.memory_bytes).c_str());
   std::printf("yarns overlap by at most %.1f %% of the thinner radius (%u iterations)\n",
               100 * relaxed.overlap_share, relaxed.iterations);
+  std::printf("%.2f %% of the segments' midpoints lie inside another fibre (%u iterations)\n",
+              100 * untangled.buried_share, untangled.iterations);
   std::printf("%s drawn in %s\n", options.out.c_str(), format_duration(seconds).c_str());
 }
 

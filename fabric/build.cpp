@@ -111,7 +111,8 @@ void bound_height(Tile& tile) {
 
 }  // namespace
 
-Tile build_tile(const v1::FabricDescription& description, RelaxReport* report) {
+Tile build_tile(const v1::FabricDescription& description, RelaxReport* report,
+                UntangleReport* untangled) {
   refuse_if_too_large(estimate_tile(description));
   Tile tile;
   for (const v1::Yarn& yarn : description.yarns()) {
@@ -133,6 +134,10 @@ Tile build_tile(const v1::FabricDescription& description, RelaxReport* report) {
     tile.size_mm = glm::vec2(layout.size_mm);
     tile.blocks = repeats;
     lay_threads(description, layout, tile);
+    const UntangleReport moved = untangle(tile);
+    if (untangled != nullptr) {
+      *untangled = moved;
+    }
   }
   bound_height(tile);
   index_segments(tile);

@@ -5,6 +5,7 @@
 
 #include "fabric/relax.h"
 #include "fabric/tile.h"
+#include "fabric/untangle.h"
 #include "proto/weft/v1/fabric.pb.h"
 
 namespace weft::fabric {
@@ -13,9 +14,10 @@ namespace weft::fabric {
 // geometry part. The same description gives the same bytes. Throws core::Error(kInvalidArgument)
 // when no such cloth can be built (yarns that cannot be packed) and kResourceExhausted when the
 // tile would exceed kTileLimitBytes or one repeat kRelaxedNodeLimit.
-// When `report` is given, it is told how the yarns were relaxed (explicit fibres are not).
+// When `report` is given, it is told how the yarns were relaxed, `untangled` how their fibres were
+// moved apart (explicit fibres stay as they are).
 [[nodiscard]] Tile build_tile(const v1::FabricDescription& description,
-                              RelaxReport* report = nullptr);
+                              RelaxReport* report = nullptr, UntangleReport* untangled = nullptr);
 
 // What a tile will need, computed from the description alone, before any of it is built.
 struct TileEstimate {

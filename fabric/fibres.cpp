@@ -4,11 +4,15 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <vector>
+
+#include <glm/geometric.hpp>
 
 #include "core/random.h"
 #include "fabric/hairs.h"
 #include "fabric/normal_deviate.h"
+#include "fabric/section_packing.h"
 
 namespace weft::fabric {
 
@@ -91,7 +95,31 @@ class FibreLayer {
       fibre.offset = random.uniform_double();
       fibres.push_back(fibre);
     }
+    for (std::uint32_t ply = 0; ply < job_.model.plies; ++ply) {
+      spread({fibres.data() + std::size_t{ply} * job_.model.fibres_per_ply,
+              job_.model.fibres_per_ply});
+    }
     return fibres;
+  }
+
+  // Moves the fibres of one ply apart in its section. The phase of a fibre's migration is its
+  // angle, so that neighbours stay neighbours all along the ply.
+  void spread(std::span<Fibre> fibres) const {
+    const glm::dvec2 half{radial_mm_, tangential_mm_};
+    if (!(half.x > 0) || !(half.y > 0)) {
+      return;
+    }
+    std::vector<glm::dvec2> points;
+    for (const Fibre& fibre : fibres) {
+      points.push_back(half * glm::dvec2(std::cos(fibre.angle), std::sin(fibre.angle)) *
+                       fibre.radius);
+    }
+    spread_in_ellipse(points, half, 2 * job_.model.fibre_radius_mm);
+    for (std::size_t f = 0; f < fibres.size(); ++f) {
+      const glm::dvec2 at = points[f] / half;
+      fibres[f].radius = glm::length(at);
+      fibres[f].angle = std::atan2(at.y, at.x);
+    }
   }
 
   // A fibre with a loop migrates even when the others do not.

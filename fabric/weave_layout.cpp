@@ -14,6 +14,8 @@ namespace {
 
 // The stiffer side keeps at least this share of the crimp.
 constexpr double kLeastCrimpShare = 0.2;
+// A yarn spreads over this share of its room, so that others can pass between it and the next one.
+constexpr double kSpread = 0.8;
 // A yarn may be narrower than its room by this much before it counts as not fitting.
 constexpr double kRoomSlack = 1e-9;
 
@@ -53,15 +55,18 @@ ThreadSet thread_set(const v1::FabricDescription& description,
   return set;
 }
 
-// Neighbours share the room between them in proportion to their radii.
+// Neighbours share the room between them in proportion to their radii. A yarn spreads in its room,
+// as yarns of finished cloth do, as far as its flattening allows; its area stays.
 void press_sideways(ThreadSet& set, const v1::FabricDescription& description) {
   const std::size_t count = set.yarns.size();
   for (std::size_t k = 0; k < count; ++k) {
     const double radius = set.radii_mm[k];
-    double room = radius;
+    double room = set.spacing_mm;
     for (const std::size_t neighbour : {(k + 1) % count, (k + count - 1) % count}) {
       room = std::min(room, set.spacing_mm * radius / (radius + set.radii_mm[neighbour]));
     }
+    const double spread = std::min(radius / (1 - set.flattenings[k]), kSpread * room);
+    room = std::max(std::min(radius, room), spread);
     const double least = radius * (1 - set.flattenings[k]);
     if (room < least * (1 - kRoomSlack)) {
       const std::string& yarn = description.yarns(static_cast<int>(set.yarns[k])).name();
