@@ -100,7 +100,7 @@ void expand_precompute(v1::Precompute& settings) {
 void thin_for_preview(v1::FabricDescription& description) {
   constexpr double kLeastShare = 0.001;
   constexpr int kMostSteps = 4;
-  constexpr double kLongSegment = 12;
+  constexpr double kLongSegment = 6;
   v1::Exemplar& exemplar = *description.mutable_exemplar();
   std::uint64_t segments = estimate_tile(description).segments;
   if (segments > kPreviewSegments * 11 / 10) {
@@ -149,12 +149,12 @@ void apply_quality(v1::FabricDescription& description) {
   v1::Exemplar& exemplar = *description.mutable_exemplar();
   if (settings.quality() == v1::QUALITY_PREVIEW) {
     settings.set_sh_order(std::min(settings.sh_order(), 4U));
-    settings.set_paths_per_cell(std::min(settings.paths_per_cell(), 4096U));
-    settings.set_visibility_resolution(std::min(settings.visibility_resolution(), 64U));
+    settings.set_paths_per_cell(std::min(settings.paths_per_cell(), 2048U));
+    settings.set_visibility_resolution(std::min(settings.visibility_resolution(), 128U));
     settings.set_pca_sample_segments(std::min(settings.pca_sample_segments(), 1024U));
-    settings.set_cell_length_mfp(std::max(settings.cell_length_mfp(), 2.0));
-    exemplar.set_repeats_x(1);
-    exemplar.set_repeats_y(1);
+    settings.set_cell_length_mfp(std::max(settings.cell_length_mfp(), 3.0));
+    exemplar.set_repeats_x(std::min(exemplar.repeats_x(), 2U));
+    exemplar.set_repeats_y(std::min(exemplar.repeats_y(), 2U));
     thin_for_preview(description);
   } else if (settings.quality() == v1::QUALITY_BEST) {
     settings.set_sh_order(std::max(settings.sh_order(), 5U));

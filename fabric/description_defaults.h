@@ -21,7 +21,7 @@ void expand_defaults(v1::FabricDescription& description);
 
 // What a tile of preview quality is thinned to: at this many segments a whole precomputation takes
 // a minute or two on two cores.
-inline constexpr std::uint64_t kPreviewSegments = 5000;
+inline constexpr std::uint64_t kPreviewSegments = 20000;
 
 // Bounds the fields that set the cost by the description's quality, as fabric.proto states at
 // Quality. Fields that the description sets are bounded, too. Doing it twice changes nothing.

@@ -12,6 +12,7 @@
 #include "core/file.h"
 #include "fabric/build.h"
 #include "fabric/description.h"
+#include "fabric/description_defaults.h"
 #include "fabric/draft.h"
 #include "fabric/presets.h"
 
@@ -67,7 +68,6 @@ TEST(Description, IsCanonicalOnceLoaded) {
   EXPECT_NEAR(once.yarns(0).fibre_radius_mm(), 0.2 * std::sqrt(0.5 / 40), 1e-12);
   EXPECT_EQ(once.precompute().quality(), v1::QUALITY_PAPER);
   EXPECT_EQ(once.precompute().paths_per_cell(), 50000U);
-  EXPECT_FALSE(once.precompute().has_target_standard_error());
   std::string text;
   ASSERT_TRUE(google::protobuf::TextFormat::PrintToString(once, &text));
   EXPECT_EQ(parse(text).SerializeAsString(), once.SerializeAsString());
@@ -126,14 +126,6 @@ TEST(Description, EveryMistakeIsListedWithItsLineAndColumn) {
        "f.textproto:1:28: sh_order is 6; a number from 0 to 5 is needed\n"
        "f.textproto:1:40: visibility_resolution is 100; a multiple of 16 is needed, such as 64 or "
        "128"},
-      {"name: \"plain\"", "name: \"plain\" precompute { target_standard_error: 0 }",
-       "f.textproto:1:28: target_standard_error is 0; a number above 0 up to 1 is needed"},
-      {"name: \"plain\"", "name: \"plain\" precompute { target_standard_error: nan }",
-       "f.textproto:1:28: target_standard_error is nan; a number above 0 up to 1 is needed"},
-      {"name: \"plain\"",
-       "name: \"plain\" precompute { target_standard_error: 1e-4 paths_per_cell: 1048577 }",
-       "f.textproto:1:56: paths_per_cell is 1048577; with a target_standard_error at most 1048576 "
-       "are possible"},
       {"name: \"plain\"", "name: \"plain\" precompute { quality: BEST }",
        "f.textproto:1:37: \"BEST\" is no value of quality; use QUALITY_PREVIEW, QUALITY_PAPER, "
        "QUALITY_BEST"},
@@ -247,13 +239,13 @@ TEST(Description, ExamplesAreOfTheSizesOfTable1) {
         Size{"shot_silk_a", 75550}, Size{"shot_silk_b", 56518}}) {
     const std::string path = std::string(WEFT_SOURCE_DIR) + "/examples/" + size.name + ".textproto";
     const TileEstimate estimate = estimate_tile(load_description(path));
-    EXPECT_GE(estimate.fibres, 2000U) << size.name;
+    EXPECT_GE(estimate.fibres, 1200U) << size.name;
     EXPECT_LE(estimate.fibres, 31100U) << size.name;
     EXPECT_NEAR(static_cast<double>(estimate.segments) / size.segments, 1, 0.2) << size.name;
     const v1::FabricDescription preview = load_description(path, v1::QUALITY_PREVIEW);
-    EXPECT_LE(estimate_tile(preview).segments, 6000U) << size.name;
-    EXPECT_EQ(preview.precompute().visibility_resolution(), 64U);
-    EXPECT_EQ(preview.precompute().paths_per_cell(), 4096U);
+    EXPECT_LE(estimate_tile(preview).segments, kPreviewSegments * 11 / 10) << size.name;
+    EXPECT_EQ(preview.precompute().visibility_resolution(), 128U);
+    EXPECT_EQ(preview.precompute().paths_per_cell(), 2048U);
   }
 }
 

@@ -87,7 +87,7 @@ TEST(Description, TheTinyExampleLoadsWithItsDefaultsExpanded) {
   const v1::FabricDescription tiny =
       load_description(std::string(WEFT_SOURCE_DIR) + "/examples/tiny.textproto");
   EXPECT_EQ(tiny.name(), "tiny");
-  EXPECT_EQ(tiny.exemplar().repeats_x(), 1U);
+  EXPECT_EQ(tiny.exemplar().repeats_x(), 2U);
   EXPECT_EQ(tiny.exemplar().fibre_share(), 1);
   EXPECT_EQ(tiny.precompute().sg_count(), 48U);
   EXPECT_TRUE(tiny.yarns(0).migration().has_r_min());
@@ -100,7 +100,7 @@ TEST(Description, ColoursAreNoPartOfTheGeometry) {
   tiny.mutable_materials(0)->mutable_c_r()->set_r(0.5);
   tiny.mutable_precompute()->set_sh_order(1);
   EXPECT_EQ(geometry_part(tiny).SerializeAsString(), before);
-  tiny.mutable_yarns(0)->set_plies(2);
+  tiny.mutable_yarns(0)->set_plies(3);
   EXPECT_NE(geometry_part(tiny).SerializeAsString(), before);
 }
 
