@@ -113,8 +113,10 @@ void print_estimate(const v1::FabricDescription& description, bool wants_json) {
     fmt::print("cells          known when the fibres are; their time and disk are not counted\n");
   }
   fmt::print("database       about {}\n", format_bytes(figures.database_bytes));
-  fmt::print("time           about {} on one core (within a factor of three)\n",
-             format_duration(figures.core_seconds));
+  const bool may_stop = description.precompute().target_standard_error() > 0;
+  fmt::print("time           about {} on one core (within a factor of three{})\n",
+             format_duration(figures.core_seconds),
+             may_stop ? "; less where cells reach the target standard error early" : "");
 }
 
 }  // namespace weft::cli

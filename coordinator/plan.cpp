@@ -7,6 +7,7 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/random.h"
+#include "core/stopping.h"
 #include "fabric/description.h"
 #include "fabric/tile.h"
 #include "proto/arrays.h"
@@ -152,6 +153,17 @@ v1::Material optics_of(const v1::FabricDescription& description, const std::stri
                         "', which the description does not define; add it to materials");
 }
 
+// A cell that may stop early is one shard: its paths are worked through in order.
+std::uint32_t paths_of_whole_cell(const v1::TransferSpec& spec) {
+  if (spec.paths_per_cell() > core::kMostStoppingPaths) {
+    throw core::Error(core::Code::kInvalidArgument,
+                      "precompute.paths_per_cell is " + std::to_string(spec.paths_per_cell()) +
+                          "; with a target_standard_error at most " +
+                          std::to_string(core::kMostStoppingPaths) + " are possible");
+  }
+  return spec.paths_per_cell();
+}
+
 Stage transfer_stage(const v1::FabricDescription& description,
                      const std::vector<core::Digest>& inputs, const fabric::Tile& tile,
                      const std::string& grid) {
@@ -160,7 +172,9 @@ Stage transfer_stage(const v1::FabricDescription& description,
   v1::TransferSpec& spec = *stage.spec.mutable_transfer();
   spec.set_sh_order(settings.sh_order());  // 0 is an order too
   spec.set_paths_per_cell(expanded(settings.paths_per_cell(), "paths_per_cell"));
-  spec.set_paths_per_shard(kPathsPerShard);
+  spec.set_target_standard_error(settings.target_standard_error());
+  spec.set_paths_per_shard(spec.target_standard_error() > 0 ? paths_of_whole_cell(spec)
+                                                            : kPathsPerShard);
   spec.set_estimator(settings.transfer_estimator() == v1::TRANSFER_ESTIMATOR_UNSPECIFIED
                          ? v1::TRANSFER_ESTIMATOR_EXIT
                          : settings.transfer_estimator());
@@ -175,7 +189,7 @@ Stage transfer_stage(const v1::FabricDescription& description,
   if (shape.size() != 2 || shape[0] == 0 || shape[1] != 3) {
     throw core::Error(core::Code::kDataLoss, "the grid's cell_coordinates are not [cells, 3]");
   }
-  stage.shard_count = shape[0] * ceil_div(spec.paths_per_cell(), kPathsPerShard);
+  stage.shard_count = shape[0] * ceil_div(spec.paths_per_cell(), spec.paths_per_shard());
   return stage;
 }
 

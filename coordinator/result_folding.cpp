@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/moments.h"
+#include "core/stopping.h"
 #include "fabric/tile.h"
 #include "proto/arrays.h"
 
@@ -129,6 +130,11 @@ void add_shard(const FinishedStage& transfer, std::uint64_t shard, const ReadBlo
   result.require(
       std::all_of(sum_of_squares.begin(), sum_of_squares.end(), [](auto s) { return s >= 0; }),
       "a sum of squares is negative");
+  if (spec.target_standard_error() > 0) {
+    result.require(core::ends_at({spec.target_standard_error(), spec.paths_per_cell()},
+                                 {sum, sum_of_squares, paths[0]}),
+                   "its paths end where the target standard error lets none end");
+  }
   cell.paths += paths[0];
   for (std::size_t i = 0; i < sum.size(); ++i) {
     cell.sum[i] += sum[i];
@@ -260,7 +266,7 @@ void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,
     for (std::uint64_t block = 0; block < blocks; ++block) {
       add_shard(transfer, cell * blocks + block, read_blob, sums);
     }
-    if (sums.paths != spec.paths_per_cell()) {
+    if (spec.target_standard_error() == 0 && sums.paths != spec.paths_per_cell()) {
       throw core::Error(core::Code::kDataLoss,
                         "stage transfer, shards " + std::to_string(cell * blocks) + " to " +
                             std::to_string(cell * blocks + blocks - 1) + ": they have " +

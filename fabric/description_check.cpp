@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/stopping.h"
 #include "fabric/draft.h"
 #include "fabric/field_checker.h"
 #include "fabric/ply.h"
@@ -232,6 +233,11 @@ void check_settings(const FieldChecker& check, const v1::FabricDescription& desc
   at.number("paths_per_cell", settings.paths_per_cell(), {1, 100000000});
   if (settings.has_target_standard_error()) {
     at.number("target_standard_error", settings.target_standard_error(), {0, 1, true});
+    if (settings.paths_per_cell() > core::kMostStoppingPaths) {
+      at.wrong("paths_per_cell", "paths_per_cell is " + std::to_string(settings.paths_per_cell()) +
+                                     "; with a target_standard_error at most " +
+                                     std::to_string(core::kMostStoppingPaths) + " are possible");
+    }
   }
   at.number("visibility_resolution", settings.visibility_resolution(), {16, 256});
   if (settings.visibility_resolution() % 16 != 0) {

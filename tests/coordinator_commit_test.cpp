@@ -383,6 +383,51 @@ TEST_F(CommitTest, Merge_GivesTheSameSumsHoweverACellIsCut) {
   }
 }
 
+// Both cells of a stage with a target standard error, the second one of `paths` paths.
+storage::FabricDatabase folded_to_error(double target, std::uint64_t paths) {
+  Results results;
+  results.put(StageName::kTransfer, 0, kCells, v1::serialize(transfer_result(0, 0, 10'000)));
+  results.put(StageName::kTransfer, 1, kCells, v1::serialize(transfer_result(1, 0, paths)));
+  FinishedStage transfer{{}, results.of(StageName::kTransfer).shards};
+  transfer.stage.name = StageName::kTransfer;
+  v1::TransferSpec& spec = *transfer.stage.spec.mutable_transfer();
+  spec.set_sh_order(kOrder);
+  spec.set_paths_per_cell(10'000);
+  spec.set_paths_per_shard(10'000);
+  spec.set_target_standard_error(target);
+  storage::FabricDatabase db;
+  db.cell_coordinates = {0, 0, 0, 1, 0, 0};
+  fold_transfer(transfer, results.reader(), db);
+  return db;
+}
+
+TEST_F(CommitTest, CellsMayEndWhereTheTargetStandardErrorLetsThemAndNowhereElse) {
+  const storage::FabricDatabase db = folded_to_error(0.5, 6144);
+  EXPECT_EQ(db.cell_paths, (std::vector<std::uint64_t>{10'000, 6144}));
+  double squares = 0;
+  for (std::size_t i = db.transfer_se.size() / 2; i < db.transfer_se.size(); ++i) {
+    squares += std::pow(static_cast<double>(db.transfer_se[i]), 2);
+  }
+  const double error = std::sqrt(2 * squares / static_cast<double>(db.transfer_se.size()));
+  EXPECT_NO_THROW(folded_to_error(1.0001 * error, 6144));
+  const auto refusal_of = [](double target, std::uint64_t paths) -> std::string {
+    try {
+      folded_to_error(target, paths);
+    } catch (const core::Error& refused) {
+      EXPECT_EQ(refused.code(), core::Code::kDataLoss);
+      return refused.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(refusal_of(0.9999 * error, 6144),
+              testing::AllOf(HasSubstr("stage transfer, shard 1"), HasSubstr("paths end")));
+  for (const std::uint64_t paths : {3072, 6100, 9999}) {
+    EXPECT_THAT(refusal_of(0.5, paths), HasSubstr("stage transfer, shard 1")) << paths;
+  }
+  // Without a target a cell has the planned paths.
+  EXPECT_THAT(refusal_of(0, 6144), HasSubstr("6144 paths together where 10000 were planned"));
+}
+
 TEST_F(CommitTest, FileSaysWhatItWasMadeFrom) {
   Results results;
   results.run_job(0);

@@ -102,6 +102,42 @@ TEST(Plan, RaisedPathsPerCell_KeepTheFullBlocks) {
   }
 }
 
+TEST(Plan, TargetStandardError_MakesACellOneShard) {
+  v1::FabricDescription description = small_description();
+  const FakeRun fixed(description);
+  EXPECT_EQ(fixed.stage(StageName::kTransfer).spec.transfer().target_standard_error(), 0);
+  description.mutable_precompute()->set_target_standard_error(0.01);
+  const FakeRun run(description);
+  const Stage& stage = run.stage(StageName::kTransfer);
+  EXPECT_EQ(stage.shard_count, kSmallCells);
+  EXPECT_EQ(stage.spec.transfer().paths_per_cell(), 40'000U);
+  EXPECT_EQ(stage.spec.transfer().paths_per_shard(), 40'000U);
+  EXPECT_EQ(stage.spec.transfer().target_standard_error(), 0.01);
+
+  // Another target or another bound is other work, for the transfer only.
+  v1::FabricDescription other = description;
+  other.mutable_precompute()->set_target_standard_error(0.02);
+  v1::FabricDescription more = description;
+  more.mutable_precompute()->set_paths_per_cell(50'000);
+  for (const v1::FabricDescription& changed : {other, more}) {
+    const FakeRun after(changed);
+    for (const StageName name : all_stages()) {
+      EXPECT_EQ(run.digest(name, 0) == after.digest(name, 0), name != StageName::kTransfer)
+          << to_string(name);
+    }
+  }
+  // A cell that may stop early is not the cell of as many paths.
+  v1::FabricDescription one_block = small_description();
+  one_block.mutable_precompute()->set_paths_per_cell(10'000);
+  v1::FabricDescription may_stop = one_block;
+  may_stop.mutable_precompute()->set_target_standard_error(0.01);
+  EXPECT_NE(FakeRun(one_block).digest(StageName::kTransfer, 0),
+            FakeRun(may_stop).digest(StageName::kTransfer, 0));
+
+  description.mutable_precompute()->set_paths_per_cell((1 << 20) + 1);
+  EXPECT_THROW(FakeRun{description}, core::Error);
+}
+
 TEST(Plan, AnotherSeed_ChangesWhatIsDrawnAndNotTheVisibility) {
   v1::FabricDescription changed = small_description();
   changed.set_seed(2);

@@ -68,6 +68,7 @@ TEST(Description, IsCanonicalOnceLoaded) {
   EXPECT_NEAR(once.yarns(0).fibre_radius_mm(), 0.2 * std::sqrt(0.5 / 40), 1e-12);
   EXPECT_EQ(once.precompute().quality(), v1::QUALITY_PAPER);
   EXPECT_EQ(once.precompute().paths_per_cell(), 50000U);
+  EXPECT_FALSE(once.precompute().has_target_standard_error());
   std::string text;
   ASSERT_TRUE(google::protobuf::TextFormat::PrintToString(once, &text));
   EXPECT_EQ(parse(text).SerializeAsString(), once.SerializeAsString());
@@ -126,6 +127,14 @@ TEST(Description, EveryMistakeIsListedWithItsLineAndColumn) {
        "f.textproto:1:28: sh_order is 6; a number from 0 to 5 is needed\n"
        "f.textproto:1:40: visibility_resolution is 100; a multiple of 16 is needed, such as 64 or "
        "128"},
+      {"name: \"plain\"", "name: \"plain\" precompute { target_standard_error: 0 }",
+       "f.textproto:1:28: target_standard_error is 0; a number above 0 up to 1 is needed"},
+      {"name: \"plain\"", "name: \"plain\" precompute { target_standard_error: nan }",
+       "f.textproto:1:28: target_standard_error is nan; a number above 0 up to 1 is needed"},
+      {"name: \"plain\"",
+       "name: \"plain\" precompute { target_standard_error: 1e-4 paths_per_cell: 1048577 }",
+       "f.textproto:1:56: paths_per_cell is 1048577; with a target_standard_error at most 1048576 "
+       "are possible"},
       {"name: \"plain\"", "name: \"plain\" precompute { quality: BEST }",
        "f.textproto:1:37: \"BEST\" is no value of quality; use QUALITY_PREVIEW, QUALITY_PAPER, "
        "QUALITY_BEST"},

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <set>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -6,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/half.h"
+#include "core/stopping.h"
 #include "fabric/description.h"
 #include "proto/arrays.h"
 #include "tests/transport_tiles.h"
@@ -195,9 +197,52 @@ TEST(WorkerBaker, Transfer_CutsACellIntoBlocks) {
   EXPECT_EQ(paths, 700u);
 }
 
+BakerContext target_context(double target) {
+  BakerContext context = transfer_context();
+  v1::TransferSpec& spec = *context.spec.mutable_transfer();
+  spec.set_paths_per_cell(20'000);
+  spec.set_paths_per_shard(20'000);
+  spec.set_target_standard_error(target);
+  context.shard_count /= 3;
+  return context;
+}
+
+struct StoppedCell {
+  std::uint64_t paths = 0;
+  double error = 0;
+};
+
+StoppedCell stopped_cell(const std::string& result) {
+  const v1::Arrays arrays = v1::parse_arrays(result);
+  const std::uint64_t paths = v1::array_of<std::uint64_t>(arrays, "paths").at(0);
+  return {paths, core::root_mean_square_error({v1::array_of<std::int64_t>(arrays, "sum"),
+                                               v1::array_of<std::int64_t>(arrays, "sum_of_squares"),
+                                               paths})};
+}
+
+TEST(WorkerBaker, TransferToAnError_UsesAsManyPathsAsTheCellNeeds) {
+  constexpr double kTarget = 0.0025;
+  const auto baker = make_baker(target_context(kTarget));
+  std::set<std::uint64_t> counts;
+  for (std::uint64_t cell = 0; cell < target_context(kTarget).shard_count; ++cell) {
+    const std::string result = baker->bake(cell, {}, never);
+    EXPECT_EQ(result, bake(target_context(kTarget), cell));
+    const StoppedCell found = stopped_cell(result);
+    EXPECT_LE(found.error, kTarget);
+    EXPECT_EQ(found.paths % 1024, 0u);
+    EXPECT_GE(found.paths, 4096u);
+    EXPECT_LT(found.paths, 20'000u);
+    counts.insert(found.paths);
+  }
+  EXPECT_GT(counts.size(), 1u);
+  EXPECT_EQ(stopped_cell(bake(target_context(1e-6), 0)).paths, 20'000u);
+  EXPECT_EQ(stopped_cell(bake(target_context(1), 0)).paths, 4096u);
+}
+
 TEST(WorkerBaker, ManyThreadsAndFloatModes_GiveTheSameBytes) {
   for (const BakerContext& context :
-       {visibility_context(), transfer_context(), transfer_context(v1::TRANSFER_ESTIMATOR_LIGHT)}) {
+       {visibility_context(), transfer_context(), transfer_context(v1::TRANSFER_ESTIMATOR_LIGHT),
+        target_context(0.005)}) {
     const auto baker = make_baker(context);
     std::vector<std::string> alone;
     for (std::uint64_t shard = 0; shard < 4; ++shard) {
@@ -271,6 +316,16 @@ TEST(WorkerBaker, NonsenseSpecs_AreRefused) {
   expect_refused(context, core::Code::kInvalidArgument);
   context = transfer_context();
   ++context.shard_count;
+  expect_refused(context, core::Code::kInvalidArgument);
+  for (const double target : {-0.1, std::nan("")}) {
+    expect_refused(target_context(target), core::Code::kInvalidArgument);
+  }
+  context = transfer_context();
+  context.spec.mutable_transfer()->set_target_standard_error(0.1);  // in blocks
+  expect_refused(context, core::Code::kInvalidArgument);
+  context = target_context(0.1);
+  context.spec.mutable_transfer()->set_paths_per_cell((1 << 20) + 1);
+  context.spec.mutable_transfer()->set_paths_per_shard((1 << 20) + 1);
   expect_refused(context, core::Code::kInvalidArgument);
   context = grid_context();
   context.shard_count = 0;

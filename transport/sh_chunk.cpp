@@ -13,7 +13,6 @@ namespace weft::transport {
 namespace {
 
 constexpr std::size_t kLanes = 8;
-constexpr double kLargestChunkSum = 0x1p25;
 
 // Coefficients of a direction, zero as far as the stride goes.
 using Harmonics = std::array<float, shading::kShMaxCount + kLanes>;
@@ -67,9 +66,9 @@ void ShChunk::flush(std::span<std::int64_t> sum, std::span<std::int64_t> sum_of_
       const std::size_t from = row * stride_ + column;
       const std::size_t to = row * coefficients_ + column;
       sum[to] += core::to_fixed_point(
-          std::clamp(static_cast<double>(sum_[from]), -kLargestChunkSum, kLargestChunkSum));
-      sum_of_squares[to] += core::to_fixed_point(
-          std::min(static_cast<double>(sum_of_squares_[from]), kLargestChunkSum));
+          std::clamp(static_cast<double>(sum_[from]), -kLargestSum, kLargestSum));
+      sum_of_squares[to] +=
+          core::to_fixed_point(std::min(static_cast<double>(sum_of_squares_[from]), kLargestSum));
     }
   }
   std::fill(sum_.begin(), sum_.end(), 0.0f);

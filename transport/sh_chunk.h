@@ -13,6 +13,9 @@ namespace weft::transport {
 // fixed point. Order matters within a chunk and nowhere else.
 class ShChunk {
  public:
+  // Sums of a chunk saturate here.
+  static constexpr double kLargestSum = 0x1p25;
+
   // REQUIRES: order <= 5.
   explicit ShChunk(std::uint32_t order);
 

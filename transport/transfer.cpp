@@ -14,7 +14,6 @@ namespace weft::transport {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr std::uint64_t kChunk = 256;
 
 // What one path estimates: `weight` times Y_j0(light) Y_j1(arrival).
 struct Estimate {
@@ -73,7 +72,7 @@ TransferSums transfer_sums(const Scene& scene, std::span<const shading::FibreBcs
                                   ? exit_estimate(path, settings, random)
                                   : light_estimate(path, settings, random);
     chunk.add(estimate.weight, arrival, estimate.light);
-    if ((i + 1) % kChunk == 0 || i + 1 == paths.first + paths.count) {
+    if ((i + 1) % kTransferChunkPaths == 0 || i + 1 == paths.first + paths.count) {
       chunk.flush(sums.sum, sums.sum_of_squares);
       pass(checkpoint);
     }

@@ -38,6 +38,8 @@ struct CellPaths {
   std::uint64_t count = 0;
 };
 
+inline constexpr std::uint64_t kTransferChunkPaths = 256;
+
 // Sums over paths of the estimates of a[j1, j0] and of their squares, in fixed point
 // (core/moments.h), [3, (order+1)^2 (j1, incoming), (order+1)^2 (j0, light)]. Chunks of 256 paths,
 // aligned to the path's number, are summed in float in order and then added in fixed point: the

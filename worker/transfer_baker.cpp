@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/stopping.h"
 #include "proto/arrays.h"
 #include "shading/fibre_bcsdf.h"
+#include "transport/stopping.h"
 #include "transport/transfer.h"
 #include "worker/bakers.h"
 
@@ -38,6 +40,12 @@ class TransferBaker : public Baker {
     require(spec_.sh_order() <= 5, "transfer", "sh_order must be between 0 and 5");
     require(spec_.paths_per_cell() > 0 && spec_.paths_per_shard() > 0, "transfer",
             "paths_per_cell and paths_per_shard must be positive");
+    require(spec_.target_standard_error() >= 0, "transfer",
+            "target_standard_error must be positive, or 0 for none");
+    require(!has_target() || (spec_.paths_per_cell() == spec_.paths_per_shard() &&
+                              spec_.paths_per_cell() <= core::kMostStoppingPaths),
+            "transfer",
+            "a target standard error needs one shard for each cell, of at most 2^20 paths");
     require(spec_.max_path_length() > 0, "transfer", "max_path_length must be positive");
     require(spec_.estimator() == v1::TRANSFER_ESTIMATOR_EXIT ||
                 spec_.estimator() == v1::TRANSFER_ESTIMATOR_LIGHT,
@@ -72,8 +80,12 @@ class TransferBaker : public Baker {
                              : transport::Estimator::kExit;
     settings.seed = spec_.seed();
     settings.max_path_length = spec_.max_path_length();
-    const transport::TransferSums sums = transport::transfer_sums(
-        input_->scene, materials_, paths, settings, stop_point(should_stop));
+    const transport::Checkpoint checkpoint = stop_point(should_stop);
+    const transport::TransferSums sums =
+        has_target()
+            ? transport::transfer_sums_to_error(input_->scene, materials_, paths, settings,
+                                                spec_.target_standard_error(), checkpoint)
+            : transport::transfer_sums(input_->scene, materials_, paths, settings, checkpoint);
 
     const std::uint64_t j = std::uint64_t{spec_.sh_order() + 1} * (spec_.sh_order() + 1);
     const std::array<std::uint64_t, 1> count{sums.paths};
@@ -85,6 +97,8 @@ class TransferBaker : public Baker {
   }
 
  private:
+  [[nodiscard]] bool has_target() const { return spec_.target_standard_error() > 0; }
+
   void read_cells(const std::string& grid) {
     const v1::Arrays arrays = v1::parse_arrays(grid);
     const auto cell_of_segment = v1::array_of<std::uint32_t>(arrays, "cell_of_segment");
