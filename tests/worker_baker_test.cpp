@@ -99,7 +99,7 @@ TEST(WorkerBaker, Geometry_IsTheTileOfItsDescription) {
   EXPECT_EQ(result, bake(context, 0));
   const fabric::Tile tile = fabric::decode_tile(result);
   EXPECT_GT(tile.segment_count(), 0u);
-  EXPECT_EQ(tile.threads.size(), 4u);
+  EXPECT_EQ(tile.threads.size(), 8u);
   context.inputs = {"something"};
   EXPECT_THROW(static_cast<void>(make_baker(context)), core::Error);
 }
