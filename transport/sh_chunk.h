@@ -13,8 +13,8 @@ namespace weft::transport {
 // fixed point. Order matters within a chunk and nowhere else.
 class ShChunk {
  public:
-  // Sums of a chunk saturate here.
-  static constexpr double kLargestSum = 0x1p25;
+  // Sums of a chunk saturate here: below 2^25, so that 64 chunks of a shard stay within 2^63.
+  static constexpr double kLargestSum = 0x1p25 - 1;
 
   // REQUIRES: order <= 5.
   explicit ShChunk(std::uint32_t order);
