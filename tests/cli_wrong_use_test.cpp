@@ -123,7 +123,7 @@ TEST(WrongUse, ADryRunPrintsOneJsonValueAndWritesNothing) {
   const std::string fabric = write_description(folder, "512");
   const Finished finished = run_weft(folder, {"run", fabric, "--dry-run", "--json"});
   ASSERT_EQ(finished.code, 0) << finished.err;
-  EXPECT_EQ(finished.json().at("fibres"), 36);
+  EXPECT_EQ(finished.json().at("fibres"), 96);
   EXPECT_GT(finished.json().at("segments"), 0);
   const Finished submitted = run_weft(folder, {"submit", fabric, "--dry-run", "--json"});
   EXPECT_EQ(submitted.out, finished.out);
