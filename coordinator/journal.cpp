@@ -5,9 +5,7 @@
 #include <mutex>
 #include <thread>
 
-#include <sqlite3.h>
-
-#include "core/check.h"
+#include "coordinator/sqlite.h"
 #include "core/error.h"
 
 namespace weft::coordinator {
@@ -35,129 +33,6 @@ CREATE TABLE IF NOT EXISTS versions(
   size_bytes INTEGER NOT NULL, file TEXT NOT NULL, job TEXT NOT NULL, comment TEXT NOT NULL,
   published_at_ms INTEGER NOT NULL, PRIMARY KEY(fabric, number)) WITHOUT ROWID;
 )sql";
-
-// The connection. Used by one thread at a time.
-class Connection {
- public:
-  explicit Connection(const std::filesystem::path& file) : file_(file.string()) {
-    const int result =
-        sqlite3_open_v2(file_.c_str(), &handle_,
-                        SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
-    if (result != SQLITE_OK) {
-      const std::string why = sqlite3_errstr(result);
-      sqlite3_close(handle_);
-      throw core::Error(core::Code::kUnavailable, "cannot open the journal " + file_ + ": " + why);
-    }
-  }
-  ~Connection() { sqlite3_close(handle_); }
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
-  Connection(Connection&&) = delete;
-  Connection& operator=(Connection&&) = delete;
-
-  [[nodiscard]] sqlite3* handle() const { return handle_; }
-
-  void run(const char* sql) {
-    if (sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr) != SQLITE_OK) {
-      fail();
-    }
-  }
-
-  [[noreturn]] void fail() const {
-    const int code = sqlite3_errcode(handle_);
-    const std::string what = "the journal " + file_ + ": " + sqlite3_errmsg(handle_);
-    if (code == SQLITE_BUSY || code == SQLITE_LOCKED) {
-      throw core::Error(core::Code::kFailedPrecondition,
-                        what + "; another coordinator uses this state folder: stop it first");
-    }
-    if (code == SQLITE_CONSTRAINT) {
-      throw core::Error(core::Code::kAlreadyExists, what);
-    }
-    throw core::Error(core::Code::kUnavailable, what + "; check the disk, then start again");
-  }
-
- private:
-  std::string file_;
-  sqlite3* handle_ = nullptr;
-};
-
-// One prepared statement: bind in order, then step.
-class Statement {
- public:
-  Statement(Connection& connection, const char* sql) : connection_(connection) {
-    if (sqlite3_prepare_v2(connection.handle(), sql, -1, &handle_, nullptr) != SQLITE_OK) {
-      connection.fail();
-    }
-  }
-  ~Statement() { sqlite3_finalize(handle_); }
-  Statement(const Statement&) = delete;
-  Statement& operator=(const Statement&) = delete;
-  Statement(Statement&&) = delete;
-  Statement& operator=(Statement&&) = delete;
-
-  Statement& text(const std::string& value) {
-    check(sqlite3_bind_text64(handle_, ++bound_, value.data(), value.size(), SQLITE_TRANSIENT,
-                              SQLITE_UTF8));
-    return *this;
-  }
-  Statement& blob(const std::string& value) {
-    // The pointer of an empty blob must not be null, or SQLite stores NULL.
-    const char* const data = value.empty() ? "" : value.data();
-    check(sqlite3_bind_blob64(handle_, ++bound_, data, value.size(), SQLITE_TRANSIENT));
-    return *this;
-  }
-  Statement& number(std::uint64_t value) {
-    check(sqlite3_bind_int64(handle_, ++bound_, static_cast<sqlite3_int64>(value)));
-    return *this;
-  }
-  Statement& null() {
-    check(sqlite3_bind_null(handle_, ++bound_));
-    return *this;
-  }
-
-  // Whether there is a(nother) row.
-  bool step() {
-    const int result = sqlite3_step(handle_);
-    if (result != SQLITE_ROW && result != SQLITE_DONE) {
-      connection_.fail();
-    }
-    return result == SQLITE_ROW;
-  }
-  void reset() {
-    sqlite3_reset(handle_);
-    bound_ = 0;
-  }
-
-  [[nodiscard]] std::string bytes_of(int column) const {
-    const void* const data = sqlite3_column_blob(handle_, column);
-    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(handle_, column));
-    return size == 0 ? std::string() : std::string(static_cast<const char*>(data), size);
-  }
-  [[nodiscard]] std::uint64_t number_of(int column) const {
-    return static_cast<std::uint64_t>(sqlite3_column_int64(handle_, column));
-  }
-  [[nodiscard]] std::int64_t signed_of(int column) const {
-    return sqlite3_column_int64(handle_, column);
-  }
-  [[nodiscard]] core::Digest digest_of(int column) const {
-    const std::optional<core::Digest> digest = core::Digest::from_binary(bytes_of(column));
-    if (!digest) {
-      throw core::Error(core::Code::kDataLoss, "the journal holds a digest of a wrong size");
-    }
-    return *digest;
-  }
-
- private:
-  void check(int result) {
-    if (result != SQLITE_OK) {
-      connection_.fail();
-    }
-  }
-
-  Connection& connection_;
-  sqlite3_stmt* handle_ = nullptr;
-  int bound_ = 0;
-};
 
 void write(Connection& c, const JobRecord& job) {
   Statement s(c,
@@ -242,6 +117,14 @@ VersionRecord version_of(const Statement& s) {
   version.comment = s.bytes_of(6);
   version.published_at_ms = s.signed_of(7);
   return version;
+}
+
+std::vector<VersionRecord> versions_of(Statement& s) {
+  std::vector<VersionRecord> versions;
+  while (s.step()) {
+    versions.push_back(version_of(s));
+  }
+  return versions;
 }
 
 }  // namespace
@@ -435,7 +318,7 @@ std::uint64_t Journal::forget_result(const core::Digest& result) {
   Statement(state_->connection, "DELETE FROM results WHERE result = ?")
       .blob(result.binary())
       .step();
-  return static_cast<std::uint64_t>(sqlite3_changes64(state_->connection.handle()));
+  return state_->connection.changed_rows();
 }
 
 std::vector<FailureRecord> Journal::failures_of(const std::string& job, StageName stage) {
@@ -473,11 +356,7 @@ std::vector<VersionRecord> Journal::latest_versions() {
                " FROM versions v WHERE number = (SELECT MAX(number) FROM versions w WHERE "
                "w.fabric = v.fabric) ORDER BY fabric")
                   .c_str());
-  std::vector<VersionRecord> versions;
-  while (s.step()) {
-    versions.push_back(version_of(s));
-  }
-  return versions;
+  return versions_of(s);
 }
 
 std::vector<VersionRecord> Journal::versions(const std::string& fabric) {
@@ -486,11 +365,7 @@ std::vector<VersionRecord> Journal::versions(const std::string& fabric) {
                                    " FROM versions WHERE fabric = ? ORDER BY number DESC")
                                       .c_str());
   s.text(fabric);
-  std::vector<VersionRecord> versions;
-  while (s.step()) {
-    versions.push_back(version_of(s));
-  }
-  return versions;
+  return versions_of(s);
 }
 
 }  // namespace weft::coordinator
