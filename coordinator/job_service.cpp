@@ -66,26 +66,32 @@ grpc::Status JobService::WatchJob(grpc::ServerContext* context, const v1::WatchJ
       return {grpc::StatusCode::RESOURCE_EXHAUSTED,
               "64 calls watch jobs already; ask with GetJob now and then"};
     }
-    v1::Job job = scheduler_.job(request->job_id());
-    for (;;) {
-      v1::WatchJobResponse response;
-      *response.mutable_job() = job;
-      if (!writer->Write(response)) {
-        return {grpc::StatusCode::CANCELLED, "the caller went away"};
-      }
-      if (job.ended_at_ms() != 0) {
-        return grpc::Status::OK;
-      }
-      std::this_thread::sleep_for(kWatchInterval);
-      const std::uint64_t seen = job.revision();
-      do {
-        if (context->IsCancelled()) {
-          return {grpc::StatusCode::CANCELLED, "the caller went away"};
-        }
-        job = scheduler_.wait_for_change(job.id(), seen, std::chrono::seconds(1));
-      } while (job.revision() == seen);
-    }
+    return send_changes(*context, request->job_id(), *writer);
   });
+}
+
+grpc::Status JobService::send_changes(const grpc::ServerContext& context, const std::string& job_id,
+                                      grpc::ServerWriter<v1::WatchJobResponse>& writer) {
+  const grpc::Status went_away(grpc::StatusCode::CANCELLED, "the caller went away");
+  v1::Job job = scheduler_.job(job_id);
+  for (;;) {
+    v1::WatchJobResponse response;
+    *response.mutable_job() = job;
+    if (!writer.Write(response)) {
+      return went_away;
+    }
+    if (job.ended_at_ms() != 0) {
+      return grpc::Status::OK;
+    }
+    std::this_thread::sleep_for(kWatchInterval);
+    const std::uint64_t seen = job.revision();
+    do {
+      if (context.IsCancelled()) {
+        return went_away;
+      }
+      job = scheduler_.wait_for_change(job.id(), seen, std::chrono::seconds(1));
+    } while (job.revision() == seen);
+  }
 }
 
 grpc::Status JobService::CancelJob(grpc::ServerContext* /*context*/,

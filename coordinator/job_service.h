@@ -25,6 +25,10 @@ class JobService final : public v1::JobService::Service {
                          v1::CancelJobResponse* response) override;
 
  private:
+  // Sends the job whenever its revision is another, until it has ended or the caller is gone.
+  grpc::Status send_changes(const grpc::ServerContext& context, const std::string& job_id,
+                            grpc::ServerWriter<v1::WatchJobResponse>& writer);
+
   Scheduler& scheduler_;
   std::atomic<int> watchers_{0};
 };

@@ -26,6 +26,15 @@ v1::FabricDescription parse_description(const std::string& bytes, const std::str
   return description;
 }
 
+v1::Job parse_summary(const JobRecord& record) {
+  v1::Job job;
+  if (!job.ParseFromString(record.summary)) {
+    throw core::Error(core::Code::kDataLoss, "the journal's record of job " + record.id +
+                                                 " is damaged; restore the state folder");
+  }
+  return job;
+}
+
 // Six bytes of a digest: the same request gives the same job.
 std::string job_id_of(const std::string& request_id) {
   return "j" + core::digest_of(request_id).hex().substr(0, 12);
@@ -95,12 +104,7 @@ void Scheduler::load() {
             nullptr);
       continue;
     }
-    v1::Job job;
-    if (!job.ParseFromString(record.summary)) {
-      throw core::Error(core::Code::kDataLoss, "the journal's record of job " + record.id +
-                                                   " is damaged; restore the state folder");
-    }
-    ended_[record.id] = job;
+    ended_[record.id] = parse_summary(record);
     ended_order_.push_front(record.id);
   }
   spdlog::info("event=loaded epoch={} unfinished_jobs={} ended_jobs={}", journal_.epoch(),
@@ -198,6 +202,24 @@ std::string Scheduler::full_id(const std::string& beginning) const {
   return ids.front();
 }
 
+// The job of the same request, when that was seen before.
+std::optional<v1::Job> Scheduler::submitted_before(const JobRecord& record) {
+  const auto file = files_.find(record.id);
+  const std::optional<JobRecord> before =
+      file == files_.end() ? journal_.job_of_request(record.request_id) : std::nullopt;
+  if (file == files_.end() && !before) {
+    return std::nullopt;
+  }
+  if (record.description !=
+      (before ? before->description : v1::canonical_bytes(file->second.description))) {
+    throw core::Error(
+        core::Code::kAlreadyExists,
+        "request_id " + record.request_id + " was used for another description; choose a new one");
+  }
+  const bool is_in_memory = file != files_.end() || ended_.contains(record.id);
+  return is_in_memory ? message(record.id) : parse_summary(*before);
+}
+
 v1::Job Scheduler::submit(const v1::SubmitRequest& request) {
   check_id(request.request_id(), "request_id");
   if (request.options().comment().size() > v1::kCommentLimitBytes) {
@@ -213,30 +235,11 @@ v1::Job Scheduler::submit(const v1::SubmitRequest& request) {
 
   std::unique_lock lock(mutex_);
   check_running();
-  const auto file = files_.find(record.id);
-  const bool is_known = file != files_.end() || ended_.contains(record.id);
-  const std::optional<JobRecord> before =
-      file == files_.end() ? journal_.job_of_request(record.request_id) : std::nullopt;
-  const std::string known_description = file != files_.end()
-                                            ? v1::canonical_bytes(file->second.description)
-                                        : before ? before->description
-                                                 : std::string();
-  if (is_known || before) {
-    if (known_description != record.description) {
-      throw core::Error(core::Code::kAlreadyExists,
-                        "request_id " + record.request_id +
-                            " was used for another description; choose a new one");
-    }
-    v1::Job job;
-    if (is_known) {
-      job = message(record.id);
-    } else {
-      CHECK(job.ParseFromString(before->summary));
-    }
+  if (std::optional<v1::Job> known = submitted_before(record)) {
     const Journal::Ticket ticket = journal_.append({});
     lock.unlock();
     journal_.wait(ticket);
-    return job;
+    return *std::move(known);
   }
   if (files_.size() >= kUnfinishedJobsLimit) {
     throw core::Error(core::Code::kResourceExhausted,

@@ -95,7 +95,8 @@ class Scheduler {
   using Task = std::variant<PlanAction, CommitAction>;
 
   void load();
-  Journal::Ticket apply(const Event& event, Reply* reply);  // REQUIRES: mutex_ is held
+  Journal::Ticket apply(const Event& event, Reply* reply);           // REQUIRES: mutex_ is held
+  std::optional<v1::Job> submitted_before(const JobRecord& record);  // REQUIRES: mutex_ is held
   void end_job(const std::string& id, std::vector<Record>& records);
   void work_through(std::deque<Task>& tasks);
   void run(const PlanAction& task);
