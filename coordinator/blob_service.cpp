@@ -43,7 +43,7 @@ grpc::Status BlobService::Read(grpc::ServerContext* /*context*/, const v1::ReadR
 
 grpc::Status BlobService::Write(grpc::ServerContext* /*context*/,
                                 grpc::ServerReader<v1::WriteRequest>* reader,
-                                v1::WriteResponse* response) {
+                                v1::WriteResponse* /*response*/) {
   return answer("Write", [&]() -> grpc::Status {
     v1::WriteRequest request;
     if (!reader->Read(&request)) {
@@ -56,7 +56,6 @@ grpc::Status BlobService::Write(grpc::ServerContext* /*context*/,
               "the blob has " + std::to_string(size) + " bytes; the limit is 1 GiB"};
     }
     if (scheduler_.blobs().has(digest)) {
-      response->set_was_present(true);
       return grpc::Status::OK;
     }
     std::string data;
@@ -74,22 +73,6 @@ grpc::Status BlobService::Write(grpc::ServerContext* /*context*/,
               "the bytes are not those of blob " + digest.hex() + "; nothing was stored"};
     }
     scheduler_.blobs().put(data);
-    return grpc::Status::OK;
-  });
-}
-
-grpc::Status BlobService::FindMissing(grpc::ServerContext* /*context*/,
-                                      const v1::FindMissingRequest* request,
-                                      v1::FindMissingResponse* response) {
-  return answer("FindMissing", [&]() -> grpc::Status {
-    if (request->digests_size() > v1::kFindMissingLimit) {
-      return {grpc::StatusCode::INVALID_ARGUMENT, "at most 10,000 digests at once"};
-    }
-    for (const std::string& bytes : request->digests()) {
-      if (!scheduler_.blobs().has(digest_from(bytes, "digests"))) {
-        response->add_missing(bytes);
-      }
-    }
     return grpc::Status::OK;
   });
 }

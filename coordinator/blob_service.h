@@ -13,8 +13,6 @@ class BlobService final : public v1::BlobService::Service {
                     grpc::ServerWriter<v1::ReadResponse>* writer) override;
   grpc::Status Write(grpc::ServerContext* context, grpc::ServerReader<v1::WriteRequest>* reader,
                      v1::WriteResponse* response) override;
-  grpc::Status FindMissing(grpc::ServerContext* context, const v1::FindMissingRequest* request,
-                           v1::FindMissingResponse* response) override;
 
  private:
   Scheduler& scheduler_;

@@ -186,7 +186,6 @@ bool AttemptTable::end_if_over(const std::shared_ptr<Attempt>& attempt) {
   if (attempt->error && !attempt->is_revoked) {
     *completion.mutable_error() = *attempt->error;
   }
-  completion.set_prepare_ms(attempt->prepare_ms);
   completion.set_work_ms(attempt->work_ms);
   completions_[{name.job_id(), name.attempt()}] = std::move(completion);
   return true;
