@@ -24,7 +24,7 @@ using namespace weft;
 
 constexpr std::uint32_t kFlights = 20000;
 constexpr std::uint32_t kImages = 1000;
-constexpr std::uint32_t kImageResolution = 64;
+constexpr std::uint32_t kImageResolution = 128;
 constexpr std::uint32_t kHoleRays = 20000;
 
 // Share of level cloth through which one sees straight down.

@@ -19,10 +19,9 @@ namespace {
 constexpr double kVisibilityPixelsPerSecond = 1.6e7;
 constexpr double kCoefficientsSecondsPerSegment = 2e-3;
 constexpr double kPathsPerSecond = 5e4;
-// The mean free path of cloth over that of as many fibres spread at random through its volume:
-// fibres start within yarns, which are denser than the cloth (0.76 to 0.85 measured in gabardine,
-// silk and satin).
-constexpr double kFibresInYarnsFactor = 0.8;
+// Share of the room that straight yarns on top of each other would take: those of cloth are pressed
+// (0.7 to 1 measured).
+constexpr double kPressed = 0.85;
 
 const v1::Yarn* find_yarn(const v1::FabricDescription& description, const std::string& name) {
   for (const v1::Yarn& yarn : description.yarns()) {
@@ -33,8 +32,20 @@ const v1::Yarn* find_yarn(const v1::FabricDescription& description, const std::s
   return nullptr;
 }
 
+// What a yarn adds to the cloth's thickness: its ellipse, spread in its room as the layout does,
+// and the reach of its hairs as far as these are many.
+double thickness_mm(const v1::Yarn& yarn, double threads_per_cm) {
+  constexpr double kSpread = 0.8;
+  const double radius = yarn.yarn_radius_mm();
+  const double spread = std::min(radius / (1 - yarn.flattening()), kSpread * 5 / threads_per_cm);
+  const double hairiness = yarn.hairs().per_mm() * yarn.hairs().length_mm() /
+                           (static_cast<double>(yarn.plies()) * yarn.fibres_per_ply());
+  return 2 * radius * radius / std::max(radius, spread) +
+         yarn.hairs().reach_mm() * std::min(1.0, hairiness);
+}
+
 // Cells of a weave: volume over the cube of the cell's length, with 1/l = pi r L_v / 2 for the mean
-// free path of cylinders of radius r and length L_v per volume.
+// free path of cylinders of radius r and length L_v per volume, spread at random.
 std::optional<std::uint64_t> estimate_cells(const v1::FabricDescription& description,
                                             const fabric::TileEstimate& tile) {
   const v1::Weave& weave = description.weave();
@@ -43,15 +54,14 @@ std::optional<std::uint64_t> estimate_cells(const v1::FabricDescription& descrip
   if (!description.has_weave() || warp == nullptr || weft == nullptr) {
     return std::nullopt;
   }
-  const double volume_mm3 = 10 * tile.ends / weave.ends_per_cm() * 10 * tile.picks /
-                            weave.picks_per_cm() * 2 *
-                            (warp->yarn_radius_mm() + weft->yarn_radius_mm());
-  const double radius_mm = (warp->fibre_radius_mm() + weft->fibre_radius_mm()) / 2 /
-                           std::sqrt(description.exemplar().fibre_share());
+  const double volume_mm3 =
+      kPressed * 10 * tile.ends / weave.ends_per_cm() * 10 * tile.picks / weave.picks_per_cm() *
+      (thickness_mm(*warp, weave.ends_per_cm()) + thickness_mm(*weft, weave.picks_per_cm()));
+  const double radius_mm = (warp->fibre_radius_mm() + weft->fibre_radius_mm()) /
+                           (2 * std::sqrt(description.exemplar().fibre_share()));
   const double length_mm = static_cast<double>(tile.segments) *
                            description.exemplar().segment_length_radii() * radius_mm;
-  const double mean_free_path_mm =
-      kFibresInYarnsFactor * 2 * volume_mm3 / (std::numbers::pi * radius_mm * length_mm);
+  const double mean_free_path_mm = 2 * volume_mm3 / (std::numbers::pi * radius_mm * length_mm);
   const double cell_mm = description.precompute().cell_length_mfp() * mean_free_path_mm;
   const double cells = volume_mm3 / (cell_mm * cell_mm * cell_mm);
   if (!std::isfinite(cells)) {

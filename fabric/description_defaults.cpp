@@ -149,10 +149,10 @@ void apply_quality(v1::FabricDescription& description) {
   v1::Exemplar& exemplar = *description.mutable_exemplar();
   if (settings.quality() == v1::QUALITY_PREVIEW) {
     settings.set_sh_order(std::min(settings.sh_order(), 4U));
-    settings.set_paths_per_cell(std::min(settings.paths_per_cell(), 2048U));
+    settings.set_paths_per_cell(std::min(settings.paths_per_cell(), 4096U));
     settings.set_visibility_resolution(std::min(settings.visibility_resolution(), 128U));
     settings.set_pca_sample_segments(std::min(settings.pca_sample_segments(), 1024U));
-    settings.set_cell_length_mfp(std::max(settings.cell_length_mfp(), 3.0));
+    settings.set_cell_length_mfp(std::max(settings.cell_length_mfp(), 2.5));
     exemplar.set_repeats_x(std::min(exemplar.repeats_x(), 2U));
     exemplar.set_repeats_y(std::min(exemplar.repeats_y(), 2U));
     thin_for_preview(description);

@@ -254,7 +254,7 @@ TEST(Description, ExamplesAreOfTheSizesOfTable1) {
     const v1::FabricDescription preview = load_description(path, v1::QUALITY_PREVIEW);
     EXPECT_LE(estimate_tile(preview).segments, kPreviewSegments * 11 / 10) << size.name;
     EXPECT_EQ(preview.precompute().visibility_resolution(), 128U);
-    EXPECT_EQ(preview.precompute().paths_per_cell(), 2048U);
+    EXPECT_EQ(preview.precompute().paths_per_cell(), 4096U);
   }
 }
 
