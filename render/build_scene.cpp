@@ -18,7 +18,8 @@
 namespace weft::render {
 namespace {
 
-constexpr double kDefaultSwatchMm = 4;
+constexpr double kDefaultThreads = 16;  // that a woven swatch shows each way
+constexpr double kDefaultSwatchMm = 4;  // of cloth that is not woven
 constexpr double kDefaultAngleDeg = 30;
 constexpr double kDefaultSharpness = 50;
 
@@ -71,19 +72,28 @@ Light light_of(const v1::Light& light, bool cut_at_horizon) {
   }
 }
 
-double swatch_size(double size_mm, double tiles, double tile_mm) {
-  if (size_mm > 0) {
-    return size_mm;
-  }
-  return tile_mm * (tiles > 0 ? tiles : std::ceil(kDefaultSwatchMm / tile_mm));
+// Whole tiles: enough for kDefaultThreads ends across, or picks along.
+double default_tiles(const fabric::Tile& tile, fabric::Role role, double tile_mm) {
+  const auto threads =
+      std::count_if(tile.threads.begin(), tile.threads.end(),
+                    [role](const fabric::Thread& thread) { return thread.role == role; });
+  return threads > 0 ? std::ceil(kDefaultThreads / static_cast<double>(threads))
+                     : std::ceil(kDefaultSwatchMm / tile_mm);
 }
 
 std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric) {
   const v1::FlatSwatch& flat = cloth.flat();
-  const glm::dvec2 tile_mm(fabric->tile().size_mm);
+  const fabric::Tile& tile = fabric->tile();
+  const glm::dvec2 tile_mm(tile.size_mm);
+  const auto size_of = [&](double size_mm, double tiles, fabric::Role role, double one_mm) {
+    if (size_mm > 0) {
+      return size_mm;
+    }
+    return one_mm * (tiles > 0 ? tiles : default_tiles(tile, role, one_mm));
+  };
   FlatPlacement placement;
-  placement.size_mm = {swatch_size(flat.size_x_mm(), flat.tiles_x(), tile_mm.x),
-                       swatch_size(flat.size_y_mm(), flat.tiles_y(), tile_mm.y)};
+  placement.size_mm = {size_of(flat.size_x_mm(), flat.tiles_x(), fabric::Role::kWarp, tile_mm.x),
+                       size_of(flat.size_y_mm(), flat.tiles_y(), fabric::Role::kWeft, tile_mm.y)};
   placement.endless = flat.endless();
   placement.turn = flat.turn_deg() * kPi / 180;
   placement.centre_mm = {flat.centre_x_mm(), flat.centre_y_mm(), flat.centre_z_mm()};
