@@ -3,11 +3,11 @@
 # workers on loopback, submits a fabric, shows progress, fetches the database into out/, renders it
 # there, and says where the picture is and how long each stage took.
 #
-#   deploy/quickstart.sh [FABRIC.textproto]      (default: examples/gabardine.textproto)
+#   deploy/quickstart.sh [FABRIC.textproto]      (default: examples/silk_plain.textproto)
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-fabric=${1:-examples/gabardine.textproto}
+fabric=${1:-examples/silk_plain.textproto}
 [ -f "$fabric" ] || { echo "quickstart: no such description: $fabric" >&2; exit 3; }
 name=$(sed -n 's/^name: *"\(.*\)".*/\1/p' "$fabric" | head -n 1)
 [ -n "$name" ] || { echo "quickstart: $fabric has no name: \"...\" line" >&2; exit 1; }
