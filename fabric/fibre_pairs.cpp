@@ -14,10 +14,18 @@ namespace {
 
 // A cell is no smaller than what a piece reaches; a tile never has more cells than this each way.
 constexpr int kMostCells = 512;
+constexpr float kRounding = 1.0001F;  // reaches are compared in single precision first
 constexpr double kShortest2 = 1e-24;  // squared length below which a piece is a point
 
 // Pieces by the cell of their midpoint, wrapped into the tile, in counting order.
 class PieceGrid {
+  // What the search reads of a piece, side by side by cell.
+  struct Member {
+    glm::vec3 middle_mm;
+    float reach_mm = 0;
+    std::uint32_t piece = 0;
+  };
+
  public:
   PieceGrid(const FibreBody& body, double margin_mm) : body_(body), margin_mm_(margin_mm) {
     measure();
@@ -32,7 +40,7 @@ class PieceGrid {
     members_.resize(count);
     std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
     for (std::uint32_t k = 0; k < count; ++k) {
-      members_[next[cell_of[k]]++] = k;
+      members_[next[cell_of[k]]++] = {glm::vec3(wrapped_[k]), static_cast<float>(reaches_[k]), k};
     }
   }
 
@@ -99,15 +107,22 @@ class PieceGrid {
   void collect_from(std::uint32_t u, glm::ivec3 cell, glm::ivec2 wrap,
                     std::vector<FibrePair>& pairs) const {
     const std::uint32_t c = index(cell);
-    for (std::uint32_t m = starts_[c]; m < starts_[c + 1]; ++m) {
-      const std::uint32_t v = members_[m];
-      if (v < u || (v == u && (wrap.x < 0 || (wrap.x == 0 && wrap.y <= 0)))) {
-        continue;  // the same pair is found from the other side
-      }
-      const glm::dvec3 step = wrapped_[v] - wrapped_[u] +
-                              glm::dvec3(wrap.x * body_.size_mm.x, wrap.y * body_.size_mm.y, 0);
-      const double reach = reaches_[u] + reaches_[v];
+    const glm::vec3 from(wrapped_[u] -
+                         glm::dvec3(wrap.x * body_.size_mm.x, wrap.y * body_.size_mm.y, 0));
+    const auto own_reach = static_cast<float>(reaches_[u]);
+    // The same pair is found from the other side: only pieces from u on, which a cell has in order.
+    std::uint32_t m = starts_[c];
+    while (m < starts_[c + 1] && members_[m].piece < u) {
+      ++m;
+    }
+    for (; m < starts_[c + 1]; ++m) {
+      const glm::vec3 step = members_[m].middle_mm - from;
+      const float reach = (members_[m].reach_mm + own_reach) * kRounding;
       if (glm::dot(step, step) >= reach * reach) {
+        continue;
+      }
+      const std::uint32_t v = members_[m].piece;
+      if (v == u && (wrap.x < 0 || (wrap.x == 0 && wrap.y <= 0))) {
         continue;
       }
       const FibrePair pair{u, v, wrap + tiles_[u] - tiles_[v]};
@@ -147,7 +162,7 @@ class PieceGrid {
   std::vector<glm::dvec3> wrapped_;  // [piece]: its midpoint, moved into the first tile
   std::vector<double> reaches_;      // [piece]: from its midpoint, half the margin included
   std::vector<std::uint32_t> starts_;
-  std::vector<std::uint32_t> members_;
+  std::vector<Member> members_;
 };
 
 }  // namespace
