@@ -34,6 +34,12 @@ std::uint64_t number_at(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
+// Whether a worker's claim, of either kind, is about an attempt that it owns.
+template <class Claim>
+bool owns(const std::string& worker, const Attempt& attempt, const Claim& claim) {
+  return attempt.worker == worker && attempt.job == claim.job && attempt.token == claim.token;
+}
+
 }  // namespace
 
 std::string Queue::make_token(const StageState& stage, std::uint64_t first,
@@ -125,8 +131,7 @@ void Queue::on(const ReportEvent& event, Time now, Actions& actions) {
 void Queue::complete(const ReportEvent& report, const CompletionClaim& claim, Time now,
                      Actions& actions) {
   const auto live = attempts_.find(claim.attempt);
-  const bool is_owner = live != attempts_.end() && live->second.worker == report.worker &&
-                        live->second.job == claim.job && live->second.token == claim.token;
+  const bool is_owner = live != attempts_.end() && owns(report.worker, live->second, claim);
   if (!is_owner) {
     Attempt run;
     const Recognised recognised = recognise(claim.job, claim.attempt, claim.token, &run);
@@ -188,8 +193,7 @@ void Queue::take_results(const JobState& job, const Attempt& run, const Completi
 
 void Queue::keep(const ReportEvent& report, const RunningClaim& claim, Time now, Actions& actions) {
   const auto live = attempts_.find(claim.attempt);
-  const bool is_owner = live != attempts_.end() && live->second.worker == report.worker &&
-                        live->second.job == claim.job && live->second.token == claim.token;
+  const bool is_owner = live != attempts_.end() && owns(report.worker, live->second, claim);
   if (!is_owner) {
     Attempt run;
     const Recognised recognised = recognise(claim.job, claim.attempt, claim.token, &run);
