@@ -7,6 +7,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 
 namespace weft::cli {
 

@@ -10,7 +10,7 @@
 #include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/output_file.h"
-#include "cli/present.h"
+#include "cli/print_json.h"
 #include "render/image.h"
 #include "render/png.h"
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "cli/print_json.h"
 #include "cli/progress.h"
 
 namespace weft::cli {
@@ -110,7 +111,7 @@ void print_estimate(const v1::FabricDescription& description, bool wants_json) {
     if (figures.cells) {
       json["cells"] = *figures.cells;
     }
-    fmt::print("{}\n", json.dump(2));
+    print_json(json);
     return;
   }
   fmt::print("fabric         {}\n", description.name());

@@ -9,6 +9,7 @@
 
 #include "cli/commands.h"
 #include "cli/fibre_colours.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "cli/quality.h"
 #include "core/error.h"
@@ -79,7 +80,7 @@ void export_fabric(const CommandOptions& options) {
                                     {"curves", tile.strands.size() * copies},
                                     {"segments", tile.segment_count() * copies},
                                     {"bytes", bytes.size()}};
-    std::printf("%s\n", summary.dump(2).c_str());
+    print_json(summary);
     return;
   }
   std::printf("%s: %llu curves, %llu segments, %s\n", options.out.c_str(),

@@ -7,6 +7,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 #include "cli/table.h"
 
 namespace weft::cli {
@@ -29,11 +30,7 @@ void run(const FabricsOptions& options) {
       client.call(client.catalogue(), &v1::CatalogueService::Stub::ListFabrics,
                   v1::ListFabricsRequest(), "list the fabrics");
   if (options.wants_json) {
-    nlohmann::json json = nlohmann::json::array();
-    for (const v1::Fabric& fabric : response.fabrics()) {
-      json.push_back(to_json(fabric));
-    }
-    print_json(json);
+    print_json(to_json_array(response.fabrics()));
     return;
   }
   Table table({"FABRIC", "VERSIONS", "LATEST", "CONTENT", "SIZE", "PUBLISHED"});

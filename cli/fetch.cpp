@@ -12,6 +12,7 @@
 #include "cli/fetch_version.h"
 #include "cli/output_file.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 
 namespace weft::cli {

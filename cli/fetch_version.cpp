@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "cli/present.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "storage/fabric_database.h"
@@ -95,15 +96,11 @@ class PartFile {
   int file_ = -1;
 };
 
-std::string reference_of(const v1::Version& version) {
-  return version.fabric() + "@" + std::to_string(version.number());
-}
-
 // One stream, from what is here to wherever it breaks off.
 grpc::Status stream_rest(Client& client, const v1::Version& version, PartFile& part,
                          const FetchReport& report) {
   v1::FetchVersionRequest request;
-  request.set_reference(reference_of(version));
+  request.set_reference(reference_text(version));
   request.set_offset(part.size_bytes());
   grpc::ClientContext context;
   const std::uint64_t allowance = version.size_bytes() / kSlowestBytesPerSecond;
@@ -116,7 +113,7 @@ grpc::Status stream_rest(Client& client, const v1::Version& version, PartFile& p
       (void)reader->Finish();
       part.clear();
       throw core::Error(core::Code::kDataLoss,
-                        reference_of(version) + ": more bytes came than the version has");
+                        reference_text(version) + ": more bytes came than the version has");
     }
     part.append(response.data());
     if (report) {
@@ -144,9 +141,9 @@ void fetch_rest(Client& client, const v1::Version& version, PartFile& part,
       wait = kFirstWait;
     }
     if (!is_worth_repeating || --tries_left == 0) {
-      client.check(status, "fetch " + reference_of(version));
+      client.check(status, "fetch " + reference_text(version));
       throw core::Error(core::Code::kDataLoss,
-                        "the coordinator's file of " + reference_of(version) + " ends too early");
+                        "the coordinator's file of " + reference_text(version) + " ends too early");
     }
     std::this_thread::sleep_for(wait);
     wait *= 2;
@@ -180,8 +177,9 @@ v1::Version find_version(Client& client, const std::string& reference) {
 core::Digest version_digest(const v1::Version& version) {
   const auto digest = core::Digest::from_binary(version.content_digest());
   if (!digest) {
-    throw core::Error(core::Code::kDataLoss, "the coordinator's answer about " +
-                                                 reference_of(version) + " has no content digest");
+    throw core::Error(
+        core::Code::kDataLoss,
+        "the coordinator's answer about " + reference_text(version) + " has no content digest");
   }
   return *digest;
 }
@@ -201,7 +199,7 @@ FetchOutcome fetch_version(Client& client, const v1::Version& version,
   if (!is_this_version(part.path(), version)) {
     part.clear();
     throw core::Error(core::Code::kDataLoss,
-                      "what came of " + reference_of(version) +
+                      "what came of " + reference_text(version) +
                           " is not what was published; it was thrown away, fetch it again");
   }
   core::publish_file(part.path(), path);

@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/estimate.h"
 #include "cli/output_file.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -127,8 +128,8 @@ std::string offer(const ImportCommand& command, const fabric::WifDraft& draft) {
          "\nfewer fibres:   " + again + " --fibre-share 0.1";
 }
 
-void print_json(const ImportCommand& command, const fabric::WifDraft& draft,
-                const fabric::ImportedDraft& imported, const Expectation& expected) {
+void print_report_json(const ImportCommand& command, const fabric::WifDraft& draft,
+                       const fabric::ImportedDraft& imported, const Expectation& expected) {
   nlohmann::json value = {{"description", command.out},
                           {"ends", draft.warp.count},
                           {"picks", draft.weft.count},
@@ -144,7 +145,7 @@ void print_json(const ImportCommand& command, const fabric::WifDraft& draft,
   } else {
     value["refused"] = expected.refusal;
   }
-  std::printf("%s\n", value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  print_json(value);
 }
 
 void print_report(const ImportCommand& command, const fabric::WifDraft& draft,
@@ -180,7 +181,7 @@ void import(const ImportCommand& command) {
   core::write_file_atomically(command.out, imported.text);
   const Expectation expected = expect(imported, command);
   if (command.json) {
-    print_json(command, draft, imported, expected);
+    print_report_json(command, draft, imported, expected);
   } else {
     print_report(command, draft, imported, expected);
   }

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "storage/database_summary.h"
 #include "storage/fabric_database.h"
@@ -205,7 +206,7 @@ void add_inspect(CLI::App& app) {
   command->callback([options] {
     const Json json = summary_of(options->file);
     if (options->json) {
-      std::printf("%s\n", json.dump(2, ' ', false, Json::error_handler_t::replace).c_str());
+      print_json(json);
     } else {
       print_summary(json);
     }

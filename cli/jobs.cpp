@@ -7,6 +7,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 #include "cli/table.h"
 #include "proto/limits.h"
 
@@ -42,11 +43,7 @@ void run(const JobsOptions& options) {
   const v1::ListJobsResponse response =
       client.call(client.jobs(), &v1::JobService::Stub::ListJobs, request, "list the jobs");
   if (options.wants_json) {
-    nlohmann::json json = nlohmann::json::array();
-    for (const v1::Job& job : response.jobs()) {
-      json.push_back(to_json(job));
-    }
-    print_json(json);
+    print_json(to_json_array(response.jobs()));
     return;
   }
   Table table({"JOB", "FABRIC", "STATE", "SHARDS", "SUBMITTED", "REMARK"});

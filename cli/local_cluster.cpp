@@ -12,7 +12,8 @@
 #include <fmt/format.h>
 
 #include "cli/client.h"
-#include "cli/present.h"
+#include "cli/print_json.h"
+#include "cli/progress.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/file.h"

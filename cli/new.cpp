@@ -10,6 +10,7 @@
 #include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/output_file.h"
+#include "cli/print_json.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/mistakes.h"
@@ -50,7 +51,7 @@ void list_presets(bool wants_json) {
     value[std::string(kind) + "s"] = names;
   }
   if (wants_json) {
-    std::printf("%s\n", value.dump(2).c_str());
+    print_json(value);
   }
 }
 
@@ -119,7 +120,7 @@ void write_new(const NewCommand& command) {
   const std::string text = preset_text(command.preset);
   if (command.out.empty()) {
     if (command.json) {
-      std::printf("%s\n", nlohmann::json({{"text", text}}).dump(2).c_str());
+      print_json(nlohmann::json({{"text", text}}));
     } else {
       std::fputs(text.c_str(), stdout);
     }
@@ -132,7 +133,7 @@ void write_new(const NewCommand& command) {
   }
   core::write_file_atomically(command.out, text);
   if (command.json) {
-    std::printf("%s\n", nlohmann::json({{"description", command.out}}).dump(2).c_str());
+    print_json(nlohmann::json({{"description", command.out}}));
   } else {
     std::printf("%s written; edit it, then: weft preview %s -o picture.png\n", command.out.c_str(),
                 command.out.c_str());

@@ -190,9 +190,4 @@ nlohmann::json to_json(const v1::Worker& worker) {
           {"failures", worker.failures()}};
 }
 
-void print_json(const nlohmann::json& json) {
-  // A name that is not UTF-8 must not end the command: its bytes are replaced.
-  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
-}
-
 }  // namespace weft::cli

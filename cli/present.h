@@ -37,7 +37,14 @@ namespace weft::cli {
 [[nodiscard]] nlohmann::json to_json(const v1::Fabric& fabric);
 [[nodiscard]] nlohmann::json to_json(const v1::Worker& worker);
 
-// One JSON value on stdout, indented, with a line break.
-void print_json(const nlohmann::json& json);
+// The same of each message of a list, as an array.
+template <class Messages>
+[[nodiscard]] nlohmann::json to_json_array(const Messages& messages) {
+  nlohmann::json array = nlohmann::json::array();
+  for (const auto& message : messages) {
+    array.push_back(to_json(message));
+  }
+  return array;
+}
 
 }  // namespace weft::cli

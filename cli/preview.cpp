@@ -13,6 +13,7 @@
 
 #include "cli/commands.h"
 #include "cli/fibre_colours.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "cli/quality.h"
 #include "cli/tile_picture.h"
@@ -106,7 +107,7 @@ void preview(const PreviewOptions& options) {
                                     {"memory_bytes", estimate.memory_bytes},
                                     {"build_seconds", build_seconds},
                                     {"seconds", seconds}};
-    std::printf("%s\n", summary.dump(2).c_str());
+    print_json(summary);
     return;
   }
   std::printf("%s: tile of %.4g x %.4g mm, %.3g mm thick\n", description.name().c_str(),

@@ -17,7 +17,8 @@
 #include "cli/commands.h"
 #include "cli/fabric_reference.h"
 #include "cli/output_file.h"
-#include "cli/present.h"
+#include "cli/print_json.h"
+#include "cli/progress.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/interrupt.h"
@@ -187,12 +188,13 @@ std::map<std::string, std::string> metadata(const v1::Scene& described, const Sh
   for (const auto& [reference, loaded] : shelf.fabrics()) {
     fabrics[reference] = {{"name", loaded.name}, {"content_digest", loaded.content_digest}};
   }
+  constexpr auto replace = nlohmann::json::error_handler_t::replace;  // a path may be no UTF-8
   return {{"weft.software", "weft 0.1.0"},
           {"weft.integrator", v1::Integrator_Name(described.integration().integrator())},
           {"weft.samples_per_pixel", std::to_string(described.picture().samples_per_pixel())},
           {"weft.seed", std::to_string(described.integration().seed())},
           {"weft.scene", json_of(described)},
-          {"weft.fabrics", fabrics.dump()},
+          {"weft.fabrics", fabrics.dump(-1, ' ', false, replace)},
           {"weft.cloth_mean", triple(drawing.cloth_mean).dump()},
           {"weft.cloth_standard_error", triple(drawing.cloth_standard_error).dump()},
           {"weft.cloth_share", nlohmann::json(drawing.cloth_share).dump()}};

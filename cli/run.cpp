@@ -13,6 +13,7 @@
 #include "cli/estimate.h"
 #include "cli/local_run.h"
 #include "cli/output_file.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "cli/quality.h"
 #include "cli/result_cache.h"
@@ -67,7 +68,7 @@ void print_result(const RunOptions& options, const v1::FabricDescription& descri
                             {"size_bytes", size_bytes},
                             {"seconds", seconds},
                             {"stages", stages}};
-  fmt::print("{}\n", json.dump(2));
+  print_json(json);
 }
 
 void run(const RunOptions& options) {

@@ -12,6 +12,7 @@
 #include "cli/follow_job.h"
 #include "cli/output_file.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 #include "cli/quality.h"
 #include "core/error.h"
 #include "fabric/description.h"

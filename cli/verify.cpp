@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/print_json.h"
 #include "core/digest.h"
 #include "core/error.h"
 #include "storage/fabric_database.h"
@@ -33,12 +34,12 @@ void add_verify(CLI::App& app) {
       if (options->json && error.code() == core::Code::kDataLoss) {
         json["valid"] = false;
         json["error"] = error.what();
-        std::printf("%s\n", json.dump(2).c_str());
+        print_json(json);
       }
       throw;
     }
     if (options->json) {
-      std::printf("%s\n", json.dump(2).c_str());
+      print_json(json);
     } else {
       std::printf("%s is whole\ncontent digest %s\n", options->file.c_str(),
                   json["content_digest"].get<std::string>().c_str());

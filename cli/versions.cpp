@@ -7,6 +7,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 #include "cli/table.h"
 
 namespace weft::cli {
@@ -32,11 +33,7 @@ void run(const VersionsOptions& options) {
       client.call(client.catalogue(), &v1::CatalogueService::Stub::ListVersions, request,
                   "list the versions of " + options.fabric);
   if (options.wants_json) {
-    nlohmann::json json = nlohmann::json::array();
-    for (const v1::Version& version : response.versions()) {
-      json.push_back(to_json(version));
-    }
-    print_json(json);
+    print_json(to_json_array(response.versions()));
     return;
   }
   Table table({"VERSION", "CONTENT", "SIZE", "PUBLISHED", "JOB", "COMMENT"});

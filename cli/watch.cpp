@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/follow_job.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 
 namespace weft::cli {
 

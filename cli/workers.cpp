@@ -7,6 +7,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/present.h"
+#include "cli/print_json.h"
 #include "cli/table.h"
 
 namespace weft::cli {
@@ -44,11 +45,7 @@ void run(const WorkersOptions& options) {
       client.call(client.workers(), &v1::WorkersService::Stub::ListWorkers,
                   v1::ListWorkersRequest(), "list the workers");
   if (options.wants_json) {
-    nlohmann::json json = nlohmann::json::array();
-    for (const v1::Worker& worker : response.workers()) {
-      json.push_back(to_json(worker));
-    }
-    print_json(json);
+    print_json(to_json_array(response.workers()));
     return;
   }
   Table table({"NAME", "ID", "THREADS", "SHARDS", "FAILURES", "LAST SEEN", "DOING"});
