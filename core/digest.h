@@ -18,8 +18,8 @@ struct Digest {
 
   // clang-tidy 14 sees the 0 with which the compiler compares.
   auto operator<=>(const Digest&) const = default;  // NOLINT(modernize-use-nullptr)
-  [[nodiscard]] std::string hex() const;     // 64 lower-case digits
-  [[nodiscard]] std::string binary() const;  // the 32 bytes
+  [[nodiscard]] std::string hex() const;            // 64 lower-case digits
+  [[nodiscard]] std::string binary() const;         // the 32 bytes
   [[nodiscard]] static std::optional<Digest> from_hex(std::string_view text);
   [[nodiscard]] static std::optional<Digest> from_binary(std::string_view bytes);
 };
