@@ -18,9 +18,8 @@
 #include "transport/visibility_raster.h"
 #include "transport/visibility_sg.h"
 
+namespace weft {
 namespace {
-
-using namespace weft;
 
 constexpr std::uint32_t kFlights = 20000;
 constexpr std::uint32_t kImages = 1000;
@@ -101,6 +100,7 @@ void print_row(const std::string& path, v1::Quality quality) {
 }
 
 }  // namespace
+}  // namespace weft
 
 int main(int argc, char** argv) {
   if (argc < 3) {
@@ -115,7 +115,7 @@ int main(int argc, char** argv) {
         "| inside another %% | moved, radii | blocked %% | holes, per mille | mfp/radius | cells | "
         "built s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (int k = 2; k < argc; ++k) {
-      print_row(argv[k], preview ? v1::QUALITY_PREVIEW : v1::QUALITY_PAPER);
+      weft::print_row(argv[k], preview ? weft::v1::QUALITY_PREVIEW : weft::v1::QUALITY_PAPER);
     }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

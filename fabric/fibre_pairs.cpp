@@ -31,7 +31,7 @@ class PieceGrid {
     measure();
     const std::size_t count = body.pieces.size();
     std::vector<std::uint32_t> cell_of(count);
-    starts_.assign(static_cast<std::size_t>(cells_.x) * cells_.y * cells_.z + 1, 0);
+    starts_.assign(std::size_t{index(cells_ - 1)} + 2, 0);
     for (std::size_t k = 0; k < count; ++k) {
       cell_of[k] = index(cell_at(wrapped_[k]));
       ++starts_[cell_of[k] + 1];
