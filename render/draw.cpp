@@ -6,6 +6,7 @@
 #include <mutex>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -53,7 +54,8 @@ PixelSums draw_pixel(const Camera& camera, const Integrator& integrator,
 void store_pixel(Drawing& drawing, const PixelSums& sums, double count, std::uint32_t x,
                  std::uint32_t y) {
   const glm::dvec3 mean = sums.radiance / count;
-  drawing.image.at(x, y) = glm::vec3(mean);
+  // Precomputed multiple scattering may be negative in single samples; a picture is not.
+  drawing.image.at(x, y) = glm::max(glm::vec3(mean), glm::vec3(0));
   if (count > 1) {
     for (int c = 0; c < 3; ++c) {
       const double variance =

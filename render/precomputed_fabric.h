@@ -73,7 +73,8 @@ class PrecomputedFabric {
   // V = [signed distance > 0].
   [[nodiscard]] bool sees(std::uint32_t segment, glm::vec3 omega) const;
 
-  // Multiple scattering c_S . (D(R) A c_light), negative values of the truncated series cut to 0.
+  // Multiple scattering c_S . (D(R) A c_light). The truncated and noisy series may fall below zero:
+  // cutting it here would make its mean too bright, so that only whole pixels are cut.
   // light_cells does the product once for all cells, for lights that come from one direction of
   // the flat fabric everywhere; the other overload does it for the hit's cell alone.
   [[nodiscard]] CellRadiance light_cells(const shading::ShVector& c_light) const;

@@ -116,9 +116,8 @@ CellRadiance PrecomputedFabric::light_cells(const ShVector& c_light) const {
 
 glm::vec3 PrecomputedFabric::multiple(const ShadingPoint& at, const CellRadiance& light) const {
   const ShVector* c_t = light.c_t.data() + std::size_t{db_.cell_of_segment[at.segment]} * 3;
-  const glm::vec3 radiance(shading::sh_dot(at.c_s[0], c_t[0]), shading::sh_dot(at.c_s[1], c_t[1]),
-                           shading::sh_dot(at.c_s[2], c_t[2]));
-  return glm::max(radiance, glm::vec3(0));
+  return {shading::sh_dot(at.c_s[0], c_t[0]), shading::sh_dot(at.c_s[1], c_t[1]),
+          shading::sh_dot(at.c_s[2], c_t[2])};
 }
 
 glm::vec3 PrecomputedFabric::multiple(const ShadingPoint& at, const ShVector& c_light) const {
@@ -128,7 +127,7 @@ glm::vec3 PrecomputedFabric::multiple(const ShadingPoint& at, const ShVector& c_
     radiance[static_cast<glm::length_t>(channel)] =
         shading::sh_dot(at.c_s[channel], transferred(cell, channel, c_light));
   }
-  return glm::max(radiance, glm::vec3(0));
+  return radiance;
 }
 
 ShVector harmonics_of_directional(glm::vec3 omega_d) {
