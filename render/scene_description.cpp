@@ -91,8 +91,7 @@ void expand_picture_defaults(v1::Scene& scene) {
   }
   if (picture.samples_per_pixel() == 0) {
     // Shaded in closed form, a fibre is noiseless; paths need more.
-    picture.set_samples_per_pixel(integration.integrator() == v1::INTEGRATOR_PRECOMPUTED ? 16
-                                                                                         : 128);
+    picture.set_samples_per_pixel(integration.integrator() == v1::INTEGRATOR_PRECOMPUTED ? 8 : 128);
   }
   if (integration.seed() == 0) {
     integration.set_seed(1);
