@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <thread>
 
@@ -38,8 +39,9 @@ std::string default_scratch() {
     return std::string(cache) + "/weft/worker";
   }
   const char* home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe)
-  return home != nullptr && *home != '\0' ? std::string(home) + "/.cache/weft/worker"
-                                          : std::string("/tmp/weft-worker");
+  return home != nullptr && *home != '\0'
+             ? std::string(home) + "/.cache/weft/worker"
+             : (std::filesystem::temp_directory_path() / "weft-worker").string();
 }
 
 struct Flags {
