@@ -1,0 +1,133 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace weft::render::gpu {
+
+// What a Vulkan device can do, as far as drawing cares.
+struct DeviceInfo {
+  enum class Kind { kDiscrete, kIntegrated, kVirtual, kSoftware, kOther };
+  std::uint32_t index = 0;  // among list_devices()
+  std::string name;
+  std::string driver;  // name and version
+  Kind kind = Kind::kOther;
+  std::uint64_t memory_bytes = 0;      // of its largest device-local heap
+  std::uint64_t max_buffer_bytes = 0;  // that one binding may span (maxStorageBufferRange)
+  std::uint32_t max_groups = 0;        // work groups along x of one dispatch
+  double timestamp_ns = 0;             // nanoseconds of one tick; 0: it cannot tell times
+};
+
+// All Vulkan 1.2 devices with a compute queue, real GPUs first. Throws
+// core::Error(kFailedPrecondition) when there is no Vulkan driver at all, saying what to install.
+[[nodiscard]] std::vector<DeviceInfo> list_devices();
+
+// A shader: SPIR-V words, embedded at build time (kernels.h), and how it is called.
+struct KernelCode {
+  const char* name;  // of the .comp file
+  std::span<const std::uint32_t> words;
+};
+
+// Memory of the device that kernels read and write. Freed when destroyed; must not outlive its
+// Device.
+class Buffer {
+ public:
+  Buffer() = default;
+  ~Buffer();
+  Buffer(Buffer&&) noexcept;
+  Buffer& operator=(Buffer&&) noexcept;
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+  [[nodiscard]] std::uint64_t size_bytes() const { return size_bytes_; }
+
+ private:
+  friend class Device;
+  struct State;
+  std::unique_ptr<State> state_;
+  std::uint64_t size_bytes_ = 0;
+};
+
+// A compute pipeline. Storage buffers are bound to set 0, binding i, in the order of a dispatch.
+class Kernel {
+ public:
+  Kernel() = default;
+  ~Kernel();
+  Kernel(Kernel&&) noexcept;
+  Kernel& operator=(Kernel&&) noexcept;
+  Kernel(const Kernel&) = delete;
+  Kernel& operator=(const Kernel&) = delete;
+
+ private:
+  friend class Device;
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// One call of a kernel. A dispatch sees everything that those before it wrote.
+struct Dispatch {
+  const Kernel* kernel = nullptr;
+  std::vector<const Buffer*> buffers;  // as many as the kernel was made for; none empty
+  std::vector<std::byte> push;         // push constants, at most 128 bytes
+  std::uint32_t groups_x = 1;
+  std::uint32_t groups_y = 1;
+};
+
+// A headless Vulkan compute device. One thread at a time. Every function throws
+// core::Error(kResourceExhausted) with figures when memory does not suffice and kUnavailable when
+// the device was lost; after that only destruction is allowed.
+class Device {
+ public:
+  // `wanted`: empty or "auto" for the best one (a real GPU where there is one, else the software
+  // device), its index in list_devices(), or a part of its name in any case. With `validation` the
+  // Khronos layer checks every call, core and synchronisation: see complaints(). Throws
+  // core::Error(kNotFound) naming the devices there are, kFailedPrecondition without a driver or
+  // without the layer.
+  [[nodiscard]] static std::unique_ptr<Device> open(const std::string& wanted,
+                                                    bool validation = false);
+  ~Device();
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+  Device(Device&&) = delete;
+  Device& operator=(Device&&) = delete;
+
+  [[nodiscard]] const DeviceInfo& info() const;
+  // What the validation layer said so far; empty is good.
+  [[nodiscard]] const std::vector<std::string>& complaints() const;
+  // Bytes of all buffers alive.
+  [[nodiscard]] std::uint64_t used_bytes() const;
+
+  // Throws core::Error(kResourceExhausted) with figures when the size exceeds max_buffer_bytes or
+  // what the heap has left.
+  [[nodiscard]] Buffer allocate(std::uint64_t size_bytes, const std::string& what);
+  // An empty span gives a buffer of 16 zero bytes, so that it can be bound.
+  [[nodiscard]] Buffer upload(std::span<const std::byte> bytes, const std::string& what);
+  template <typename T>
+  [[nodiscard]] Buffer upload(const std::vector<T>& values, const std::string& what) {
+    return upload(std::as_bytes(std::span(values)), what);
+  }
+  void write(Buffer& to, std::uint64_t offset_bytes, std::span<const std::byte> bytes);
+  void read(const Buffer& from, std::uint64_t offset_bytes, std::span<std::byte> bytes);
+  void fill_zero(Buffer& buffer);
+
+  // `constants` are the specialisation constants 0, 1, 2, ...
+  [[nodiscard]] Kernel make_kernel(const KernelCode& code, std::uint32_t buffer_count,
+                                   std::uint32_t push_bytes,
+                                   std::span<const std::uint32_t> constants = {});
+
+  // Runs the dispatches in order as one submission and waits for its end, in slices. Returns the
+  // device's nanoseconds for each (zeros where it cannot tell). Callers keep one call to 5 to 50 ms
+  // of work, so that they can stop in between and no watchdog fires.
+  std::vector<double> run(std::span<const Dispatch> dispatches);
+
+ private:
+  struct State;
+  explicit Device(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace weft::render::gpu
