@@ -1,0 +1,27 @@
+#include "cli/fabric_shelf.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "cli/fabric_reference.h"
+
+namespace weft::cli {
+
+FabricShelf::FabricShelf(std::string main_reference, std::string coordinator,
+                         render::Fabric::Wanted wanted)
+    : main_reference_(std::move(main_reference)),
+      coordinator_(std::move(coordinator)),
+      wanted_(wanted) {}
+
+const render::LoadedFabric& FabricShelf::take(const std::string& reference) {
+  const std::string& named = reference.empty() ? main_reference_ : reference;
+  const auto found = fabrics_.find(named);
+  if (found != fabrics_.end()) {
+    return found->second;
+  }
+  const std::filesystem::path path =
+      render::is_description(named) ? named : resolve_fabric(named, coordinator_).string();
+  return fabrics_.emplace(named, render::load_fabric(path, wanted_)).first->second;
+}
+
+}  // namespace weft::cli

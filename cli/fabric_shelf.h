@@ -1,0 +1,33 @@
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "render/load_fabric.h"
+
+namespace weft::cli {
+
+// The fabrics of one scene, each loaded once.
+class FabricShelf {
+ public:
+  // `main_reference` is what an empty reference means; published versions are fetched from
+  // `coordinator`.
+  FabricShelf(std::string main_reference, std::string coordinator, render::Fabric::Wanted wanted);
+
+  // Loads what `reference` (a database's or description's path, or a published version) names.
+  // Throws core::Error.
+  const render::LoadedFabric& take(const std::string& reference);
+
+  // By reference, all that were taken.
+  [[nodiscard]] const std::map<std::string, render::LoadedFabric>& fabrics() const {
+    return fabrics_;
+  }
+
+ private:
+  std::string main_reference_;
+  std::string coordinator_;
+  render::Fabric::Wanted wanted_;
+  std::map<std::string, render::LoadedFabric> fabrics_;
+};
+
+}  // namespace weft::cli

@@ -1,0 +1,99 @@
+#include "cli/render_options.h"
+
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "cli/client.h"
+#include "core/error.h"
+#include "render/image.h"
+#include "render/scene_description.h"
+
+namespace weft::cli {
+
+namespace {
+
+void apply_size(const std::string& text, v1::Picture& picture) {
+  if (text.empty()) {
+    return;
+  }
+  unsigned width = 0;
+  unsigned height = 0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%ux%u%c", &width, &height, &rest) != 2 || width == 0 ||
+      height == 0 || width > render::kImageSideLimit || height > render::kImageSideLimit) {
+    throw core::Error(core::Code::kInvalidArgument,
+                      fmt::format("--size {}: no picture size; write WIDTHxHEIGHT, such as "
+                                  "1024x768, each from 1 to {}",
+                                  text, render::kImageSideLimit));
+  }
+  picture.set_width(width);
+  picture.set_height(height);
+}
+
+}  // namespace
+
+v1::Scene described_scene(const RenderOptions& options) {
+  v1::Scene scene =
+      options.scene.empty() ? render::default_scene() : render::load_scene(options.scene);
+  apply_size(options.size, *scene.mutable_picture());
+  if (options.samples) {
+    scene.mutable_picture()->set_samples_per_pixel(*options.samples);
+  }
+  v1::Integration& integration = *scene.mutable_integration();
+  if (options.seed) {
+    integration.set_seed(*options.seed);
+  }
+  if (options.max_scatterings) {
+    integration.set_max_scatterings(*options.max_scatterings);
+  }
+  if (!options.integrator.empty()) {
+    integration.set_integrator(options.integrator == "path" ? v1::INTEGRATOR_PATH
+                                                            : v1::INTEGRATOR_PRECOMPUTED);
+  }
+  if (options.local) {
+    integration.set_local(true);
+  }
+  if (options.single_only) {
+    integration.set_scattering(v1::SCATTERING_SINGLE_ONLY);
+  } else if (options.multiple_only) {
+    integration.set_scattering(v1::SCATTERING_MULTIPLE_ONLY);
+  }
+  render::expand_picture_defaults(scene);
+  return scene;
+}
+
+void add_render_options(CLI::App& command, RenderOptions& options) {
+  command.add_option("fabric", options.fabric, "Database, published version or description")
+      ->required();
+  command.add_option("-o,--output", options.out, "Picture to write (.exr)")->required();
+  command.add_option("--png", options.png, "Preview to write as well (.png)");
+  command.add_option("--exposure", options.exposure,
+                     "Stops that brighten the preview; default: its mean becomes middle grey");
+  command.add_option("--stderr-image", options.stderr_image,
+                     "Standard error of every pixel, to write as well (.exr)");
+  command.add_flag("--float", options.floats, "Write 32-bit pixels in place of 16-bit ones");
+  command.add_option("--scene", options.scene, "Scene to draw (.textproto or .json)");
+  command
+      .add_option("--integrator", options.integrator,
+                  "path: every fibre, all bounces; precomputed: the database's transfer")
+      ->check(CLI::IsMember({"path", "precomputed"}));
+  command.add_flag("--local", options.local,
+                   "Path integrator: end paths that leave the cloth, as the precomputation does");
+  command.add_option("--max-scatterings", options.max_scatterings,
+                     "Path integrator: end paths after as many; 0: no limit");
+  command.add_option("--spp", options.samples, "Samples per pixel")->check(CLI::Range(1, 1 << 20));
+  command.add_option("--size", options.size, "WIDTHxHEIGHT in pixels");
+  command.add_option("--threads", options.threads, "Threads; default: all the machine has")
+      ->check(CLI::Range(0, 1024));
+  command.add_option("--seed", options.seed, "Seed of the samples");
+  auto* single =
+      command.add_flag("--single-only", options.single_only, "Light scattered once alone");
+  command
+      .add_flag("--multiple-only", options.multiple_only, "Light scattered more than once alone")
+      ->excludes(single);
+  add_coordinator_option(command, options.coordinator);
+  command.add_flag("--json", options.wants_json, "Print one JSON value on stdout");
+}
+
+}  // namespace weft::cli

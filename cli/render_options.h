@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "proto/weft/v1/scene.pb.h"
+
+namespace weft::cli {
+
+// What a person may say to `weft render`.
+struct RenderOptions {
+  std::string coordinator;
+  std::string fabric;
+  std::string scene;
+  std::string out;
+  std::string png;
+  std::string stderr_image;
+  std::string integrator;
+  std::string size;
+  std::optional<std::uint32_t> samples;
+  std::optional<std::uint64_t> seed;
+  std::optional<std::uint32_t> max_scatterings;
+  std::optional<float> exposure;
+  unsigned threads = 0;
+  bool local = false;
+  bool single_only = false;
+  bool multiple_only = false;
+  bool floats = false;
+  bool wants_json = false;
+};
+
+// Declares every flag of the command; `options` must outlive it.
+void add_render_options(CLI::App& command, RenderOptions& options);
+
+// The scene as it will be drawn: the flags stand above the file, defaults are filled in. Throws
+// core::Error.
+[[nodiscard]] v1::Scene described_scene(const RenderOptions& options);
+
+}  // namespace weft::cli

@@ -1,0 +1,34 @@
+#include "render/make_integrator.h"
+
+#include "render/path_integrator.h"
+#include "render/precomputed_integrator.h"
+
+namespace weft::render {
+namespace {
+
+Scattering scattering_of(const v1::Integration& integration) {
+  switch (integration.scattering()) {
+    case v1::SCATTERING_SINGLE_ONLY:
+      return Scattering::kSingleOnly;
+    case v1::SCATTERING_MULTIPLE_ONLY:
+      return Scattering::kMultipleOnly;
+    default:
+      return Scattering::kAll;
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration,
+                                            const Scene& scene) {
+  if (integration.integrator() == v1::INTEGRATOR_PATH) {
+    PathSettings settings;
+    settings.local = integration.local();
+    settings.max_scatterings = integration.max_scatterings();
+    settings.scattering = scattering_of(integration);
+    return std::make_unique<PathIntegrator>(scene, settings);
+  }
+  return std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration));
+}
+
+}  // namespace weft::render
