@@ -2,11 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
+
+#include "render/gpu/kernel_code.h"
 
 namespace weft::render::gpu {
 
@@ -19,19 +22,13 @@ struct DeviceInfo {
   Kind kind = Kind::kOther;
   std::uint64_t memory_bytes = 0;      // of its largest device-local heap
   std::uint64_t max_buffer_bytes = 0;  // that one binding may span (maxStorageBufferRange)
-  std::uint32_t max_groups = 0;        // work groups along x of one dispatch
+  std::uint32_t max_groups = 0;        // work groups along x, and along y, of one dispatch
   double timestamp_ns = 0;             // nanoseconds of one tick; 0: it cannot tell times
 };
 
-// All Vulkan 1.2 devices with a compute queue, real GPUs first. Throws
+// All Vulkan 1.2 devices with a compute queue and scalar block layout, real GPUs first. Throws
 // core::Error(kFailedPrecondition) when there is no Vulkan driver at all, saying what to install.
 [[nodiscard]] std::vector<DeviceInfo> list_devices();
-
-// A shader: SPIR-V words, embedded at build time (kernels.h), and how it is called.
-struct KernelCode {
-  const char* name;  // of the .comp file
-  std::span<const std::uint32_t> words;
-};
 
 // Memory of the device that kernels read and write. Freed when destroyed; must not outlive its
 // Device.
@@ -72,9 +69,33 @@ class Kernel {
 struct Dispatch {
   const Kernel* kernel = nullptr;
   std::vector<const Buffer*> buffers;  // as many as the kernel was made for; none empty
-  std::vector<std::byte> push;         // push constants, at most 128 bytes
+  std::vector<std::byte> push;         // push constants, as many bytes as the kernel was made for
   std::uint32_t groups_x = 1;
   std::uint32_t groups_y = 1;
+};
+
+inline constexpr std::uint32_t kPushBytesLimit = 128;
+
+// The bytes of a plain struct, for Dispatch::push.
+template <typename T>
+[[nodiscard]] std::vector<std::byte> push_constants(const T& value) {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kPushBytesLimit);
+  std::vector<std::byte> bytes(sizeof(T));
+  std::memcpy(bytes.data(), &value, sizeof(T));
+  return bytes;
+}
+
+enum class Validation {
+  kOff,
+  kOn,        // the Khronos layer checks every call, core and synchronisation
+  kInKernel,  // GPU-assisted: the layer's own code in the kernels checks every access; slow
+};
+
+struct DeviceOptions {
+  Validation validation = Validation::kOff;
+  // Data goes through a staging buffer even where the host sees the device's memory, as it does on
+  // a GPU with memory of its own: lets tests walk that way on any device.
+  bool always_stage = false;
 };
 
 // A headless Vulkan compute device. One thread at a time. Every function throws
@@ -83,12 +104,11 @@ struct Dispatch {
 class Device {
  public:
   // `wanted`: empty or "auto" for the best one (a real GPU where there is one, else the software
-  // device), its index in list_devices(), or a part of its name in any case. With `validation` the
-  // Khronos layer checks every call, core and synchronisation: see complaints(). Throws
+  // device), its index in list_devices(), or a part of its name in any case. Throws
   // core::Error(kNotFound) naming the devices there are, kFailedPrecondition without a driver or
-  // without the layer.
-  [[nodiscard]] static std::unique_ptr<Device> open(const std::string& wanted,
-                                                    bool validation = false);
+  // without the layer that validation needs.
+  [[nodiscard]] static std::unique_ptr<Device> open(const std::string& wanted = {},
+                                                    const DeviceOptions& options = {});
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
@@ -96,13 +116,13 @@ class Device {
   Device& operator=(Device&&) = delete;
 
   [[nodiscard]] const DeviceInfo& info() const;
-  // What the validation layer said so far; empty is good.
+  // What the validation layer said so far, errors and warnings; empty is good.
   [[nodiscard]] const std::vector<std::string>& complaints() const;
   // Bytes of all buffers alive.
   [[nodiscard]] std::uint64_t used_bytes() const;
 
   // Throws core::Error(kResourceExhausted) with figures when the size exceeds max_buffer_bytes or
-  // what the heap has left.
+  // what the heap has left. The contents are undefined. REQUIRES: size_bytes > 0.
   [[nodiscard]] Buffer allocate(std::uint64_t size_bytes, const std::string& what);
   // An empty span gives a buffer of 16 zero bytes, so that it can be bound.
   [[nodiscard]] Buffer upload(std::span<const std::byte> bytes, const std::string& what);
@@ -112,16 +132,25 @@ class Device {
   }
   void write(Buffer& to, std::uint64_t offset_bytes, std::span<const std::byte> bytes);
   void read(const Buffer& from, std::uint64_t offset_bytes, std::span<std::byte> bytes);
+  // The first `count` values.
+  template <typename T>
+  [[nodiscard]] std::vector<T> download(const Buffer& from, std::size_t count) {
+    std::vector<T> values(count);
+    read(from, 0, std::as_writable_bytes(std::span(values)));
+    return values;
+  }
   void fill_zero(Buffer& buffer);
 
-  // `constants` are the specialisation constants 0, 1, 2, ...
+  // `constants` are the specialisation constants 0, 1, 2, ... REQUIRES: push_bytes is a multiple of
+  // 4 and at most kPushBytesLimit; the code binds no more than `buffer_count` buffers.
   [[nodiscard]] Kernel make_kernel(const KernelCode& code, std::uint32_t buffer_count,
                                    std::uint32_t push_bytes,
                                    std::span<const std::uint32_t> constants = {});
 
   // Runs the dispatches in order as one submission and waits for its end, in slices. Returns the
   // device's nanoseconds for each (zeros where it cannot tell). Callers keep one call to 5 to 50 ms
-  // of work, so that they can stop in between and no watchdog fires.
+  // of work, so that they can stop in between and no watchdog fires. Throws
+  // core::Error(kResourceExhausted) when a dispatch has more groups than the device takes.
   std::vector<double> run(std::span<const Dispatch> dispatches);
 
  private:
