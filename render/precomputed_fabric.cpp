@@ -5,15 +5,14 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/half.h"
 #include "shading/bcsdf_sh.h"
-#include "shading/sh_rotation.h"
-#include "shading/visibility.h"
 
 namespace weft::render {
 namespace {
 
 using storage::FabricDatabase;
+
+static_assert(shading::kCsAngles == shading::kBcsdfShAngles);
 
 void require(bool holds, const char* what) {
   if (!holds) {
@@ -100,62 +99,44 @@ const shading::FibreBcsdf& PrecomputedFabric::bcsdf_of_segment(std::uint32_t seg
 
 ShadingPoint PrecomputedFabric::point(std::uint32_t segment, glm::vec3 tangent,
                                       glm::vec3 omega_o) const {
-  ShadingPoint at;
-  at.segment = segment;
-  at.bcsdf = &bcsdf_of_segment(segment);
-  at.to_fibre = shading::fibre_frame(tangent, omega_o);
-  at.omega_o = at.to_fibre * omega_o;
+  ShadingPoint at{shading::seen_fibre(tangent, omega_o), segment, &bcsdf_of_segment(segment), {}};
   // C_S by linear interpolation in theta_o, then from omega_o-space to the flat fabric.
-  const float theta_o = shading::fibre_angle(at.omega_o).theta;
-  const float t = std::clamp((theta_o + shading::kHalfPi) / shading::kPi, 0.0f, 1.0f) *
-                  static_cast<float>(shading::kBcsdfShAngles - 1);
-  const std::size_t i =
-      std::min(static_cast<std::size_t>(t), static_cast<std::size_t>(shading::kBcsdfShAngles - 2));
-  const float f = t - static_cast<float>(i);
-  const std::size_t n = sh_count(db_);
-  const shading::ShRotation to_flat = shading::sh_rotation(glm::transpose(at.to_fibre));
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    const std::size_t row =
-        (std::size_t{material_of_segment_[segment]} * 3 + channel) * shading::kBcsdfShAngles + i;
-    const float* low = db_.c_s.data() + row * n;
-    shading::ShVector c = shading::sh_zero();
-    for (std::size_t j = 0; j < n; ++j) {
-      c.c[j] = low[j] + f * (low[n + j] - low[j]);
-    }
-    at.c_s[channel] = shading::sh_rotate(to_flat, c);
+  const shading::FabricTables all = tables();
+  const shading::CsPlace place = shading::c_s_place(shading::fibre_angle(at.omega_o).theta);
+  const shading::ShRotation to_flat = shading::sh_rotation_to_flat(at);
+  const auto material = static_cast<int>(material_of_segment_[segment]);
+  for (int channel = 0; channel < 3; ++channel) {
+    at.c_s[static_cast<std::size_t>(channel)] =
+        shading::sh_rotate(to_flat, shading::c_s_at(all, material, channel, place));
   }
   return at;
 }
 
+shading::FabricTables PrecomputedFabric::tables() const {
+  shading::FabricTables t;
+  t.sizes.resolution = static_cast<int>(db_.visibility_resolution);
+  t.sizes.ssdf_pairs = static_cast<int>(db_.pca_components / 2 + 1);
+  t.sizes.gaussians = static_cast<int>(db_.sg_count);
+  t.sizes.sharpness = db_.sg_sharpness;
+  t.sizes.harmonics = static_cast<int>(sh_count(db_));
+  t.components = db_.pca_components;
+  t.basis = basis_.data();
+  t.ssdf = db_.ssdf.data();
+  t.gaussians = db_.ssg.data();
+  t.rotations = db_.ssg_rotation.data();
+  t.open_shares = db_.open_share.data();
+  t.axes = sg_axes_.data();
+  t.c_s = db_.c_s.data();
+  t.transfer = db_.transfer.data();
+  return t;
+}
+
 float PrecomputedFabric::signed_distance(std::uint32_t segment, glm::vec3 omega) const {
-  const float share = core::float_from_half(db_.open_share[segment]);
-  if (share <= 0) {
-    return -shading::kPi;
-  }
-  const float above_horizon = std::asin(std::clamp(omega.z, -1.0f, 1.0f));
-  if (share >= 1) {
-    return above_horizon;
-  }
-  const std::size_t components = db_.pca_components;
-  const std::uint16_t* coefficients = db_.ssdf.data() + segment * components;
-  const shading::MapFootprint footprint =
-      shading::map_footprint(omega, static_cast<int>(db_.visibility_resolution));
-  std::array<const float*, 4> pixel{};
-  float distance = 0;
-  for (std::size_t k = 0; k < 4; ++k) {
-    pixel[k] = basis_.data() + static_cast<std::size_t>(footprint.index[k]) * (components + 1);
-    distance += footprint.weight[k] * *pixel[k]++;
-  }
-  for (std::size_t c = 0; c < components; ++c) {
-    const float value = footprint.weight[0] * pixel[0][c] + footprint.weight[1] * pixel[1][c] +
-                        footprint.weight[2] * pixel[2][c] + footprint.weight[3] * pixel[3][c];
-    distance += value * core::float_from_half(coefficients[c]);
-  }
-  return std::min(distance, above_horizon);
+  return shading::signed_distance(tables(), static_cast<int>(segment), omega);
 }
 
 bool PrecomputedFabric::sees(std::uint32_t segment, glm::vec3 omega) const {
-  return omega.z > 0 && signed_distance(segment, omega) > 0;
+  return shading::segment_sees(tables(), static_cast<int>(segment), omega);
 }
 
 }  // namespace weft::render

@@ -8,9 +8,8 @@
 #include <glm/vec3.hpp>
 
 #include "shading/fibre_bcsdf.h"
-#include "shading/gamma.h"
-#include "shading/spherical_gaussian.h"
-#include "shading/spherical_harmonics.h"
+#include "shading/multiple_scattering.h"
+#include "shading/single_scattering.h"
 #include "storage/fabric_database.h"
 
 namespace weft::render {
@@ -26,11 +25,9 @@ struct PrecomputedSettings {
 
 // Where an eye ray met a fibre, prepared for any number of lights. All directions of this header
 // are unit vectors in the frame of the flat fabric that point away from the hit.
-struct ShadingPoint {
+struct ShadingPoint : shading::SeenFibre {
   std::uint32_t segment = 0;
   const shading::FibreBcsdf* bcsdf = nullptr;  // of the PrecomputedFabric
-  glm::mat3 to_fibre{1};                       // flat fabric to omega_o-space
-  glm::vec3 omega_o{0};                        // in omega_o-space
   std::array<shading::ShVector, 3> c_s;        // C_S per channel, turned into the flat fabric
 };
 
@@ -83,10 +80,7 @@ class PrecomputedFabric {
 
  private:
   void take_basis();
-  [[nodiscard]] glm::vec3 single_by_gaussians(const ShadingPoint& at,
-                                              const shading::SphericalGaussian& light) const;
-  [[nodiscard]] shading::ShVector transferred(std::size_t cell, std::size_t channel,
-                                              const shading::ShVector& c_light) const;
+  [[nodiscard]] shading::FabricTables tables() const;
 
   storage::FabricDatabase db_;
   PrecomputedSettings settings_;
