@@ -6,21 +6,22 @@
 
 namespace weft::render {
 
-Camera::Camera(const View& view, double aspect)
-    : position_mm_(view.position_mm), perspective_(view.perspective) {
-  forward_ = glm::normalize(view.look_at_mm - view.position_mm);
-  const glm::dvec3 right = glm::cross(forward_, view.up);
+Camera::Camera(const View& view, double aspect) {
+  frame_.position_mm = view.position_mm;
+  frame_.perspective = view.perspective;
+  frame_.forward = glm::normalize(view.look_at_mm - view.position_mm);
+  const glm::dvec3 right = glm::cross(frame_.forward, view.up);
   CHECK_GT(glm::length(right), 0.0);
-  across_ = glm::normalize(right) * view.height * aspect;
-  down_ = glm::cross(forward_, glm::normalize(right)) * view.height;
+  frame_.across = glm::normalize(right) * view.height * aspect;
+  frame_.down = glm::cross(frame_.forward, glm::normalize(right)) * view.height;
 }
 
 Ray Camera::ray(const glm::dvec2& picture) const {
-  const glm::dvec3 offset = (picture.x - 0.5) * across_ + (picture.y - 0.5) * down_;
-  if (perspective_) {
-    return {position_mm_, glm::normalize(forward_ + offset)};
+  const glm::dvec3 offset = (picture.x - 0.5) * frame_.across + (picture.y - 0.5) * frame_.down;
+  if (frame_.perspective) {
+    return {frame_.position_mm, glm::normalize(frame_.forward + offset)};
   }
-  return {position_mm_ + offset, forward_};
+  return {frame_.position_mm + offset, frame_.forward};
 }
 
 }  // namespace weft::render

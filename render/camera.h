@@ -26,12 +26,18 @@ class Camera {
 
   [[nodiscard]] Ray ray(const glm::dvec2& picture) const;
 
+  // What ray() computes from.
+  struct Frame {
+    glm::dvec3 position_mm{0, 0, 0};
+    glm::dvec3 forward{0, 0, 1};
+    glm::dvec3 across{1, 0, 0};  // of the whole picture, to the right
+    glm::dvec3 down{0, 1, 0};    // of the whole picture
+    bool perspective = true;
+  };
+  [[nodiscard]] const Frame& frame() const { return frame_; }
+
  private:
-  glm::dvec3 position_mm_;
-  glm::dvec3 forward_;
-  glm::dvec3 across_;  // of the whole picture, to the right
-  glm::dvec3 down_;    // of the whole picture
-  bool perspective_;
+  Frame frame_;
 };
 
 }  // namespace weft::render

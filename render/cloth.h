@@ -7,6 +7,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "render/cloth_form.h"
 #include "render/fabric.h"
 #include "render/ray.h"
 #include "transport/scene.h"
@@ -85,6 +86,9 @@ class Cloth {
 
   // FibreHit::to_flat when it is the same at every hit.
   [[nodiscard]] virtual std::optional<glm::mat3> constant_rotation() const = 0;
+
+  // How the piece lies in the world, for those who follow rays through it by other means.
+  [[nodiscard]] virtual ClothForm form() const = 0;
 
   // A box around the piece, for framing; an endless piece gives a part of it.
   struct Bounds {

@@ -100,6 +100,10 @@ class FlatCloth : public Cloth {
     return glm::mat3(to_flat_);
   }
 
+  [[nodiscard]] ClothForm form() const override {
+    return {placement_.black_underlay, FlatForm{to_flat_, placement_.centre_mm, low_, high_}};
+  }
+
   [[nodiscard]] Bounds bounds() const override {
     const glm::dvec2 half = 0.5 * placement_.size_mm;
     const double c = std::fabs(std::cos(placement_.turn));

@@ -131,6 +131,9 @@ class ShellCloth : public Cloth {
   }
 
   [[nodiscard]] std::optional<glm::mat3> constant_rotation() const override { return std::nullopt; }
+  [[nodiscard]] ClothForm form() const override {
+    return {black_underlay_, ShellForm{&shell_, contact_mm_}};
+  }
   [[nodiscard]] Bounds bounds() const override { return bounds_; }
 
  private:
