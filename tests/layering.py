@@ -27,6 +27,7 @@ BEHIND = {
     r"embree3/.*": {"transport/scene.cpp", "render/triangle_scene.cpp"},
     r"(OpenEXR/)?Imf.*": {"render/image.cpp"},
     r"png\.h": {"render/png.cpp"},
+    r"vulkan/.*": {"render/gpu/vulkan.h"},
     r"sqlite3\.h": {"coordinator/sqlite.cpp"},
     r"tiny_obj_loader\.h": {"render/obj_mesh.cpp"},
     r"openssl/.*": {"core/digest.cpp"},

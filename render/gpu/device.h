@@ -9,26 +9,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "render/gpu/device_info.h"
 #include "render/gpu/kernel_code.h"
 
 namespace weft::render::gpu {
-
-// What a Vulkan device can do, as far as drawing cares.
-struct DeviceInfo {
-  enum class Kind { kDiscrete, kIntegrated, kVirtual, kSoftware, kOther };
-  std::uint32_t index = 0;  // among list_devices()
-  std::string name;
-  std::string driver;  // name and version
-  Kind kind = Kind::kOther;
-  std::uint64_t memory_bytes = 0;      // of its largest device-local heap
-  std::uint64_t max_buffer_bytes = 0;  // that one binding may span (maxStorageBufferRange)
-  std::uint32_t max_groups = 0;        // work groups along x, and along y, of one dispatch
-  double timestamp_ns = 0;             // nanoseconds of one tick; 0: it cannot tell times
-};
-
-// All Vulkan 1.2 devices with a compute queue and scalar block layout, real GPUs first. Throws
-// core::Error(kFailedPrecondition) when there is no Vulkan driver at all, saying what to install.
-[[nodiscard]] std::vector<DeviceInfo> list_devices();
 
 // Memory of the device that kernels read and write. Freed when destroyed; must not outlive its
 // Device.
@@ -68,8 +52,8 @@ class Kernel {
 // One call of a kernel. A dispatch sees everything that those before it wrote.
 struct Dispatch {
   const Kernel* kernel = nullptr;
-  std::vector<const Buffer*> buffers;  // as many as the kernel was made for; none empty
-  std::vector<std::byte> push;         // push constants, as many bytes as the kernel was made for
+  std::vector<const Buffer*> buffers{};  // as many as the kernel was made for; none empty
+  std::vector<std::byte> push{};         // push constants, as many bytes as the kernel was made for
   std::uint32_t groups_x = 1;
   std::uint32_t groups_y = 1;
 };
@@ -154,6 +138,8 @@ class Device {
   std::vector<double> run(std::span<const Dispatch> dispatches);
 
  private:
+  friend class Buffer;
+  friend class Kernel;
   struct State;
   explicit Device(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
