@@ -28,6 +28,7 @@ struct CompareOptions {
   std::string image;
   std::string reference;
   std::string out;
+  std::string layer;
   std::optional<double> scale;
   bool wants_json = false;
 };
@@ -50,8 +51,8 @@ void run(const CompareOptions& options) {
   if (!options.out.empty()) {
     check_output_file(options.out);
   }
-  const render::Image image = render::read_exr(options.image);
-  const render::Image reference = render::read_exr(options.reference);
+  const render::Image image = render::read_exr(options.image, options.layer);
+  const render::Image reference = render::read_exr(options.reference, options.layer);
   const render::Comparison comparison = render::compare(image, reference);
   const double scale = options.scale ? *options.scale : render::natural_scale(image, reference);
   if (!options.out.empty()) {
@@ -94,6 +95,8 @@ void add_compare(CLI::App& app) {
   command->add_option("reference", options->reference, "Picture B, the reference (.exr)")
       ->required();
   command->add_option("-o,--output", options->out, "Difference picture to write (.png)");
+  command->add_option("--layer", options->layer,
+                      "Compare a layer of both, such as single or multiple");
   command
       ->add_option("--scale", options->scale,
                    "Difference that is shown full; default: what one pixel in a hundred exceeds")

@@ -59,8 +59,9 @@ void run(const RenderOptions& options) {
   for (const std::string& remark : scene.remarks) {
     fmt::print(stderr, "weft: {}\n", remark);
   }
+  const render::LayerSet layers = render::layers_of(described.picture());
   const std::unique_ptr<render::Integrator> integrator =
-      render::make_integrator(described.integration(), scene);
+      render::make_integrator(described.integration(), scene, layers.has(render::Layer::kShadow));
   const double load_seconds = loading.seconds();
 
   render::DrawSettings settings;
@@ -69,11 +70,12 @@ void run(const RenderOptions& options) {
   settings.samples_per_pixel = described.picture().samples_per_pixel();
   settings.seed = described.integration().seed();
   settings.threads = options.threads;
+  settings.layers = layers;
   const core::Stopwatch drawing_time;
   render::Drawing drawing = render::draw(scene.camera, *integrator, settings, progress_line(),
                                          [&] { return interrupt.requested(); });
   const double draw_seconds = drawing_time.seconds();
-  write_pictures(options, drawing, picture_metadata(described, shelf, drawing));
+  write_pictures(options, layers, drawing, picture_metadata(described, shelf, drawing));
   report_drawing(options, described, drawing, load_seconds, draw_seconds);
 }
 

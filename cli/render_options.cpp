@@ -7,6 +7,7 @@
 #include "cli/client.h"
 #include "core/error.h"
 #include "render/image.h"
+#include "render/layers.h"
 #include "render/scene_description.h"
 
 namespace weft::cli {
@@ -31,6 +32,15 @@ void apply_size(const std::string& text, v1::Picture& picture) {
   picture.set_height(height);
 }
 
+std::string mistake_in_layers(const std::string& text) {
+  try {
+    static_cast<void>(render::parse_layers(text));
+  } catch (const core::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
 }  // namespace
 
 v1::Scene described_scene(const RenderOptions& options) {
@@ -39,6 +49,9 @@ v1::Scene described_scene(const RenderOptions& options) {
   apply_size(options.size, *scene.mutable_picture());
   if (options.samples) {
     scene.mutable_picture()->set_samples_per_pixel(*options.samples);
+  }
+  if (options.layers) {
+    render::set_layers(render::parse_layers(*options.layers), *scene.mutable_picture());
   }
   v1::Integration& integration = *scene.mutable_integration();
   if (options.seed) {
@@ -73,6 +86,11 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   command.add_option("--stderr-image", options.stderr_image,
                      "Standard error of every pixel, to write as well (.exr)");
   command.add_flag("--float", options.floats, "Write 32-bit pixels in place of 16-bit ones");
+  command
+      .add_option("--layers", options.layers,
+                  "Layers of the .exr besides its colour, with commas: single, multiple, shadow, "
+                  "segment, tangent, normal, variance; or all")
+      ->check(mistake_in_layers);
   command.add_option("--scene", options.scene, "Scene to draw (.textproto or .json)");
   command
       .add_option("--integrator", options.integrator,

@@ -20,6 +20,7 @@ struct RenderOptions {
   std::string stderr_image;
   std::string integrator;
   std::string size;
+  std::optional<std::string> layers;
   std::optional<std::uint32_t> samples;
   std::optional<std::uint64_t> seed;
   std::optional<std::uint32_t> max_scatterings;

@@ -7,6 +7,7 @@
 #include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/error.h"
+#include "render/drawing_channels.h"
 #include "render/image.h"
 #include "render/png.h"
 
@@ -48,11 +49,12 @@ std::map<std::string, std::string> picture_metadata(const v1::Scene& described,
           {"weft.cloth_share", nlohmann::json(drawing.cloth_share).dump()}};
 }
 
-void write_pictures(const RenderOptions& options, render::Drawing& drawing,
+void write_pictures(const RenderOptions& options, render::LayerSet layers, render::Drawing& drawing,
                     const std::map<std::string, std::string>& attributes) {
   const render::ExrPixels pixels =
       options.floats ? render::ExrPixels::kFloat : render::ExrPixels::kHalf;
   drawing.image.attributes = attributes;
+  render::attach_layers(drawing, layers);
   render::write_exr(options.out, drawing.image, pixels);
   if (!options.stderr_image.empty()) {
     drawing.standard_error.attributes = attributes;

@@ -14,9 +14,9 @@ namespace weft::cli {
                                                                   const FabricShelf& shelf,
                                                                   const render::Drawing& drawing);
 
-// Writes every file that was asked for, `attributes` in the headers of those that have one. Throws
-// core::Error(kUnavailable) when one cannot be written.
-void write_pictures(const RenderOptions& options, render::Drawing& drawing,
+// Writes every file that was asked for, `layers` into the picture, `attributes` in the headers of
+// those that have one. Throws core::Error(kUnavailable) when one cannot be written.
+void write_pictures(const RenderOptions& options, render::LayerSet layers, render::Drawing& drawing,
                     const std::map<std::string, std::string>& attributes);
 
 // Says on stdout what was drawn and how long it took.

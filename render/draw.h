@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 
 #include <glm/vec3.hpp>
 
 #include "render/camera.h"
 #include "render/image.h"
 #include "render/integrator.h"
+#include "render/layers.h"
 
 namespace weft::render {
 
@@ -17,11 +19,13 @@ struct DrawSettings {
   std::uint32_t samples_per_pixel = 64;
   std::uint64_t seed = 1;
   unsigned threads = 0;  // 0: as many as the machine has
+  LayerSet layers;       // wanted besides the colour
 };
 
 struct Drawing {
   Image image;           // mean radiance of each pixel
   Image standard_error;  // of that mean; zero with one sample a pixel
+  Layers layers;         // those that were wanted
   // Over all eye rays that met cloth: their mean radiance and its standard error, and the share of
   // eye rays that met it. The pixels are fixed, so that only the spread within them counts.
   glm::dvec3 cloth_mean{0, 0, 0};
@@ -37,5 +41,37 @@ struct Drawing {
                            const DrawSettings& settings,
                            const std::function<void(double)>& progress,
                            const std::function<bool()>& should_stop);
+
+// A drawing that grows: the sums over the samples of each pixel so far. draw() is all samples in
+// one pass; the same number in several passes gives the same picture, bit by bit.
+class GrowingDrawing {
+ public:
+  // REQUIRES: as draw().
+  explicit GrowingDrawing(const DrawSettings& settings);
+  ~GrowingDrawing();
+  GrowingDrawing(const GrowingDrawing&) = delete;
+  GrowingDrawing& operator=(const GrowingDrawing&) = delete;
+  GrowingDrawing(GrowingDrawing&&) = delete;
+  GrowingDrawing& operator=(GrowingDrawing&&) = delete;
+
+  // Adds `count` samples to every pixel; `progress` and `should_stop` as for draw(). After an
+  // exception the sums are of no use: take drawing() before.
+  void add_samples(const Camera& camera, const Integrator& integrator, std::uint32_t count,
+                   const std::function<void(double)>& progress,
+                   const std::function<bool()>& should_stop);
+
+  [[nodiscard]] std::uint32_t samples() const { return samples_; }
+  // REQUIRES: samples() > 0.
+  [[nodiscard]] Drawing drawing() const;
+
+  // Memory that one takes, with the Drawing made of it.
+  [[nodiscard]] static std::uint64_t size_bytes(const DrawSettings& settings);
+
+ private:
+  struct Sums;
+  DrawSettings settings_;
+  std::unique_ptr<Sums> sums_;
+  std::uint32_t samples_ = 0;
+};
 
 }  // namespace weft::render

@@ -1,10 +1,12 @@
 #include "render/image.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <exception>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include <ImathBox.h>
 #include <OpenEXR/ImfArray.h>
@@ -66,64 +68,115 @@ class MemoryInput : public Imf::IStream {
   std::size_t position_ = 0;
 };
 
-std::vector<half> to_half(const std::vector<glm::vec3>& pixels) {
-  std::vector<half> values;
-  values.reserve(pixels.size() * 3);
-  constexpr float kLargest = 65504.0f;
-  for (const glm::vec3& pixel : pixels) {
-    for (int c = 0; c < 3; ++c) {
-      values.emplace_back(std::clamp(pixel[c], -kLargest, kLargest));
+constexpr float kLargestHalf = 65504.0f;
+
+// A plane of the picture in the type in which it is written.
+struct Plane {
+  std::string name;
+  Imf::PixelType type = Imf::HALF;
+  std::vector<half> halves;
+  std::vector<float> floats;
+  std::vector<std::uint32_t> numbers;
+
+  [[nodiscard]] Imf::Slice slice(std::uint32_t width) {
+    const auto slice_of = [&](auto& values) {
+      const std::size_t bytes = sizeof(values[0]);
+      return Imf::Slice(type, reinterpret_cast<char*>(values.data()), bytes, bytes * width);
+    };
+    switch (type) {
+      case Imf::HALF:
+        return slice_of(halves);
+      case Imf::FLOAT:
+        return slice_of(floats);
+      default:
+        return slice_of(numbers);
     }
   }
-  return values;
+};
+
+Plane plane_of(std::string name, std::vector<float> values, bool as_halves) {
+  Plane plane;
+  plane.name = std::move(name);
+  plane.type = as_halves ? Imf::HALF : Imf::FLOAT;
+  if (as_halves) {
+    plane.halves.reserve(values.size());
+    for (const float value : values) {
+      plane.halves.emplace_back(std::clamp(value, -kLargestHalf, kLargestHalf));
+    }
+  } else {
+    plane.floats = std::move(values);
+  }
+  return plane;
 }
 
-Imf::FrameBuffer interleaved(Imf::PixelType type, char* base, std::size_t element_bytes,
-                             std::uint32_t width) {
-  Imf::FrameBuffer buffer;
-  for (std::size_t c = 0; c < 3; ++c) {
-    buffer.insert(kColourChannels[c], Imf::Slice(type, base + c * element_bytes, 3 * element_bytes,
-                                                 3 * element_bytes * width));
+std::vector<Plane> planes_of(const Image& image, bool halves) {
+  std::vector<Plane> planes;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<float> values;
+    values.reserve(image.pixels.size());
+    for (const glm::vec3& pixel : image.pixels) {
+      values.push_back(pixel[c]);
+    }
+    planes.push_back(plane_of(kColourChannels[c], std::move(values), halves));
   }
-  return buffer;
+  for (const ImageChannel& channel : image.channels) {
+    if (const auto* numbers = std::get_if<std::vector<std::uint32_t>>(&channel.values)) {
+      CHECK_EQ(numbers->size(), image.pixels.size());
+      planes.push_back({channel.name, Imf::UINT, {}, {}, *numbers});
+    } else {
+      const auto& floats = std::get<std::vector<float>>(channel.values);
+      CHECK_EQ(floats.size(), image.pixels.size());
+      planes.push_back(plane_of(channel.name, floats, halves && !channel.always_float));
+    }
+  }
+  return planes;
 }
 
-// The channel that colour c is read from.
-const char* channel_for(const Imf::ChannelList& channels, std::size_t c,
-                        const std::filesystem::path& path) {
-  if (channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B")) {
-    return kColourChannels[c];
+// The channels that the three colours of a layer are read from.
+std::array<std::string, 3> channels_for(const Imf::ChannelList& channels, std::string_view layer,
+                                        const std::string& file_name) {
+  const std::string prefix = layer.empty() ? "" : std::string(layer) + ".";
+  const auto has = [&](const char* name) {
+    return channels.findChannel((prefix + name).c_str()) != nullptr;
+  };
+  if (has("R") && has("G") && has("B")) {
+    return {prefix + "R", prefix + "G", prefix + "B"};
   }
-  if (channels.findChannel("Y") && !channels.findChannel("RY")) {
-    return "Y";
+  if (has("X") && has("Y") && has("Z")) {
+    return {prefix + "X", prefix + "Y", prefix + "Z"};
+  }
+  if (has("Y") && !has("RY")) {
+    return {prefix + "Y", prefix + "Y", prefix + "Y"};
   }
   std::string names;
   for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
     names += names.empty() ? channel.name() : std::string(", ") + channel.name();
   }
-  throw core::Error(core::Code::kInvalidArgument,
-                    path.string() + ": the picture has the channels " + names +
-                        "; give one with the channels R, G, B or with Y alone");
+  throw core::Error(
+      core::Code::kInvalidArgument,
+      file_name + ": the picture has the channels " + names +
+          (layer.empty() ? "; give one with the channels R, G, B or with Y alone"
+                         : "; none of them are colours of the layer '" + std::string(layer) + "'"));
 }
 
-Image read_from(MemoryInput& input, const std::filesystem::path& path) {
+Image read_from(MemoryInput& input, const std::string& name, std::string_view layer) {
   Imf::InputFile file(input, 0);
   const Imath::Box2i window = file.header().dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
   const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
   if (width < 1 || height < 1 || width > kImageSideLimit || height > kImageSideLimit) {
     throw core::Error(core::Code::kInvalidArgument,
-                      path.string() + ": the picture is " + std::to_string(width) + " x " +
+                      name + ": the picture is " + std::to_string(width) + " x " +
                           std::to_string(height) + " pixels; at most " +
                           std::to_string(kImageSideLimit) + " a side can be read");
   }
   Image image(static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height));
   // One plane at a time: a frame buffer cannot name a channel twice, and grey fills all three.
+  const std::array<std::string, 3> names = channels_for(file.header().channels(), layer, name);
   std::vector<float> plane(image.pixels.size());
   for (std::size_t c = 0; c < 3; ++c) {
     Imf::FrameBuffer buffer;
-    buffer.insert(channel_for(file.header().channels(), c, path),
-                  Imf::Slice::Make(Imf::FLOAT, plane.data(), window));
+    buffer.insert(names[c], Imf::Slice::Make(Imf::FLOAT, plane.data(), window));
     file.setFrameBuffer(buffer);
     file.readPixels(window.min.y, window.max.y);
     for (std::size_t i = 0; i < plane.size(); ++i) {
@@ -144,31 +197,21 @@ Image read_from(MemoryInput& input, const std::filesystem::path& path) {
 void write_exr(const std::filesystem::path& path, const Image& image, ExrPixels pixels) {
   CHECK_EQ(image.pixels.size(), static_cast<std::size_t>(image.width) * image.height);
   CHECK(!image.pixels.empty());
-  const bool halves = pixels == ExrPixels::kHalf;
-  const Imf::PixelType type = halves ? Imf::HALF : Imf::FLOAT;
   Imf::Header header(static_cast<int>(image.width), static_cast<int>(image.height));
   header.compression() = Imf::ZIP_COMPRESSION;
-  for (const char* name : kColourChannels) {
-    header.channels().insert(name, Imf::Channel(type));
+  std::vector<Plane> planes = planes_of(image, pixels == ExrPixels::kHalf);
+  Imf::FrameBuffer buffer;
+  for (Plane& plane : planes) {
+    header.channels().insert(plane.name, Imf::Channel(plane.type));
+    buffer.insert(plane.name, plane.slice(image.width));
   }
   for (const auto& [name, value] : image.attributes) {
     header.insert(name, Imf::StringAttribute(value));
   }
-  std::vector<half> half_values;
-  std::vector<glm::vec3> float_values;
-  char* base = nullptr;
-  if (halves) {
-    half_values = to_half(image.pixels);
-    base = reinterpret_cast<char*>(half_values.data());
-  } else {
-    float_values = image.pixels;
-    base = reinterpret_cast<char*>(float_values.data());
-  }
   MemoryOutput output;
   try {
     Imf::OutputFile file(output, header, 0);
-    file.setFrameBuffer(
-        interleaved(type, base, halves ? sizeof(half) : sizeof(float), image.width));
+    file.setFrameBuffer(buffer);
     file.writePixels(static_cast<int>(image.height));
   } catch (const std::exception& error) {
     throw core::Error(core::Code::kInternal,
@@ -177,20 +220,23 @@ void write_exr(const std::filesystem::path& path, const Image& image, ExrPixels 
   core::write_file_atomically(path, output.bytes());
 }
 
-Image read_exr(const std::filesystem::path& path) {
-  const std::string bytes = core::read_file(path, kFileLimitBytes);
+Image read_exr(const std::filesystem::path& path, std::string_view layer) {
+  return read_exr_bytes(core::read_file(path, kFileLimitBytes), path.string(), layer);
+}
+
+Image read_exr_bytes(std::string_view bytes, const std::string& name, std::string_view layer) {
   MemoryInput input(bytes);
   try {
-    return read_from(input, path);
+    return read_from(input, name, layer);
   } catch (const core::Error& error) {
     if (error.code() != core::Code::kDataLoss) {
       throw;
     }
-    throw core::Error(core::Code::kDataLoss, path.string() + ": not a whole OpenEXR picture: " +
+    throw core::Error(core::Code::kDataLoss, name + ": not a whole OpenEXR picture: " +
                                                  error.what() + "; make or fetch it again");
   } catch (const std::exception& error) {
     throw core::Error(core::Code::kDataLoss,
-                      path.string() + ": not an OpenEXR picture that can be read: " + error.what());
+                      name + ": not an OpenEXR picture that can be read: " + error.what());
   }
 }
 

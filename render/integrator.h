@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstdint>
+
 #include <glm/vec3.hpp>
 
 #include "core/random.h"
+#include "render/layers.h"
 #include "render/ray.h"
 
 namespace weft::render {
@@ -14,6 +17,14 @@ enum class Scattering { kAll, kSingleOnly, kMultipleOnly };
 struct EyeSample {
   glm::vec3 radiance{0, 0, 0};
   bool on_cloth = false;  // it met a fibre
+  // Of what met a fibre (the background is neither):
+  glm::vec3 single{0, 0, 0};         // the part of radiance that met one fibre,
+  glm::vec3 multiple{0, 0, 0};       // and that met more
+  float shadow = 0;                  // share_let_through; 0 when it was not wanted
+  std::uint32_t cloth = kNoSegment;  // index of the piece of cloth
+  std::uint32_t segment = kNoSegment;
+  glm::vec3 tangent{0, 0, 0};  // of the fibre, unit, in the world
+  glm::vec3 normal{0, 0, 0};   // of the cloth, unit, in the world
 };
 
 // Estimates the radiance along eye rays, without bias to its own idea of transport. Any thread may

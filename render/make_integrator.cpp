@@ -19,16 +19,17 @@ Scattering scattering_of(const v1::Integration& integration) {
 
 }  // namespace
 
-std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration,
-                                            const Scene& scene) {
+std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration, const Scene& scene,
+                                            bool wants_shadow) {
   if (integration.integrator() == v1::INTEGRATOR_PATH) {
     PathSettings settings;
     settings.local = integration.local();
     settings.max_scatterings = integration.max_scatterings();
     settings.scattering = scattering_of(integration);
+    settings.wants_shadow = wants_shadow;
     return std::make_unique<PathIntegrator>(scene, settings);
   }
-  return std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration));
+  return std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration), wants_shadow);
 }
 
 }  // namespace weft::render

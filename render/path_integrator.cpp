@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "render/eye_surface.h"
 #include "shading/fibre_bcsdf.h"
 
 namespace weft::render {
@@ -145,13 +146,15 @@ EyeSample PathIntegrator::trace(const Ray& eye_ray, core::Random& random) const 
   }
   const bool single_only = settings_.scattering == Scattering::kSingleOnly;
   const std::uint32_t limit = single_only ? 1 : settings_.max_scatterings;
-  glm::vec3 radiance(0);
+  EyeSample seen;
+  describe_surface(first.hit, seen);
   glm::vec3 throughput(1);
   Vertex vertex = vertex_at(first.hit, -eye_ray.direction);
   for (std::uint32_t scatterings = 1;; ++scatterings) {
+    glm::vec3& part = scatterings == 1 ? seen.single : seen.multiple;
     const bool counts = settings_.scattering != Scattering::kMultipleOnly || scatterings > 1;
     if (counts) {
-      radiance += throughput * from_lights(vertex, random);
+      part += throughput * from_lights(vertex, random);
     }
     const float u_lobe = random.uniform();
     const float u_theta = random.uniform();
@@ -173,14 +176,18 @@ EyeSample PathIntegrator::trace(const Ray& eye_ray, core::Random& random) const 
     const Ray ray{vertex.hit.fibre.world_mm, glm::normalize(glm::dvec3(direction))};
     const Next next = follow(vertex, ray);
     if (counts) {
-      radiance += throughput * from_direction(next, ray, static_cast<double>(sample.pdf));
+      part += throughput * from_direction(next, ray, static_cast<double>(sample.pdf));
     }
     if (!next.hit || (limit > 0 && scatterings >= limit)) {
       break;
     }
     vertex = vertex_at(*next.hit, -ray.direction);
   }
-  return {radiance, true};
+  seen.radiance = seen.single + seen.multiple;
+  if (settings_.wants_shadow) {
+    seen.shadow = share_let_through(scene_, first.hit, random);
+  }
+  return seen;
 }
 
 }  // namespace weft::render

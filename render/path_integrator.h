@@ -18,6 +18,7 @@ struct PathSettings {
   // same mean; lights of one direction are always drawn.
   enum class Finding { kBoth, kLights, kDirections };
   Finding finding = Finding::kBoth;
+  bool wants_shadow = false;  // EyeSample::shadow; the radiance does not depend on it
 };
 
 // Follows paths from the eye through every fibre they meet, with all bounces: the reference for

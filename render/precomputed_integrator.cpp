@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include "core/check.h"
+#include "render/eye_surface.h"
 #include "render/sphere_sampling.h"
 
 namespace weft::render {
@@ -40,8 +41,15 @@ struct PrecomputedIntegrator::Arrival {
   std::optional<glm::dvec3> point_mm;
 };
 
-PrecomputedIntegrator::PrecomputedIntegrator(const Scene& scene, Scattering scattering)
-    : scene_(scene), scattering_(scattering) {
+// What one light sends to the eye.
+struct PrecomputedIntegrator::Scattered {
+  glm::vec3 single{0, 0, 0};
+  glm::vec3 multiple{0, 0, 0};
+};
+
+PrecomputedIntegrator::PrecomputedIntegrator(const Scene& scene, Scattering scattering,
+                                             bool wants_shadow)
+    : scene_(scene), scattering_(scattering), wants_shadow_(wants_shadow) {
   for (const auto& cloth : scene.cloths) {
     const PrecomputedFabric* fabric = cloth->fabric().precomputed();
     CHECK(fabric != nullptr);
@@ -101,8 +109,9 @@ glm::vec3 PrecomputedIntegrator::multiple(const Shaded& at, std::size_t light,
 // Section 5.2.2: the light is shaded as if it were unoccluded by distant cloth, and scaled by the
 // share of it that is. That share is of the light above the fabric's own horizon: what is below
 // counts nothing in the shading already.
-glm::vec3 PrecomputedIntegrator::from_gaussian(const Shaded& at, std::size_t index,
-                                               core::Random& random) const {
+PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_gaussian(const Shaded& at,
+                                                                      std::size_t index,
+                                                                      core::Random& random) const {
   const auto& light = std::get<SgLight>(scene_.lights[index]);
   const auto drawn = [&]() -> std::optional<Arrival> {
     for (int draw = 0; draw < kMaxDraws; ++draw) {
@@ -121,31 +130,33 @@ glm::vec3 PrecomputedIntegrator::from_gaussian(const Shaded& at, std::size_t ind
            reaches(from_mm, *arrival);
   };
   const shading::SphericalGaussian local = gaussian_in(at.hit.fibre.to_flat, light);
-  glm::vec3 sum(0);
+  Scattered sum;
   if (single_wanted(scattering_) && lit(at.top_mm)) {
-    sum += at.fabric.single_sg(at.point, local);
+    sum.single = at.fabric.single_sg(at.point, local) * light.irradiance;
   }
   if (multiple_wanted(scattering_) && lit(neighbour(at, random))) {
-    sum += multiple(at, index, harmonics_of_sg(local));
+    sum.multiple = multiple(at, index, harmonics_of_sg(local)) * light.irradiance;
   }
-  return sum * light.irradiance;
+  return sum;
 }
 
 // One direction towards the light, shaded as a directional light.
-glm::vec3 PrecomputedIntegrator::from_drawn(const Shaded& at, std::size_t index,
-                                            core::Random& random) const {
+PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_drawn(const Shaded& at,
+                                                                   std::size_t index,
+                                                                   core::Random& random) const {
   const double u1 = random.uniform_double();
   const double u2 = random.uniform_double();
   const LightSample sample = sample_light(scene_.lights[index], at.hit.fibre.world_mm, u1, u2);
   const glm::vec3 omega_d = glm::normalize(at.hit.fibre.to_flat * glm::vec3(sample.direction));
   if (sample.radiance == glm::vec3(0) || !(omega_d.z > 0)) {
-    return glm::vec3(0);
+    return {};
   }
   Arrival arrival{sample.direction, std::nullopt};
   if (sample.distance_mm < kInfinity) {
     arrival.point_mm = at.hit.fibre.world_mm + sample.distance_mm * sample.direction;
   }
-  glm::vec3 sum(0);
+  const glm::vec3 weight = sample.radiance / static_cast<float>(sample.pdf);
+  Scattered sum;
   if (single_wanted(scattering_)) {
     glm::vec3 single = at.fabric.single_directional(at.point, omega_d);
     if (!sample.one_direction) {  // the other part comes by directions drawn from the fibre
@@ -154,13 +165,13 @@ glm::vec3 PrecomputedIntegrator::from_drawn(const Shaded& at, std::size_t index,
       single *= static_cast<float>(sample.pdf / (sample.pdf + other));
     }
     if (single != glm::vec3(0) && reaches(at.top_mm, arrival)) {
-      sum += single;
+      sum.single = single * weight;
     }
   }
   if (multiple_wanted(scattering_) && reaches(neighbour(at, random), arrival)) {
-    sum += multiple(at, index, harmonics_of_directional(omega_d));
+    sum.multiple = multiple(at, index, harmonics_of_directional(omega_d)) * weight;
   }
-  return sum * sample.radiance / static_cast<float>(sample.pdf);
+  return sum;
 }
 
 // Single scattering of finite lights is sharp: directions are drawn from the BCSDF too, and both
@@ -193,17 +204,18 @@ glm::vec3 PrecomputedIntegrator::from_fibre_direction(const Shaded& at, const Li
   return sample.weight * met->radiance * static_cast<float>(pdf / (pdf + met->pdf));
 }
 
-glm::vec3 PrecomputedIntegrator::from_light(const Shaded& at, std::size_t index,
-                                            core::Random& random) const {
+PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_light(const Shaded& at,
+                                                                   std::size_t index,
+                                                                   core::Random& random) const {
   const Light& light = scene_.lights[index];
   if (std::holds_alternative<SgLight>(light)) {
     return from_gaussian(at, index, random);
   }
-  glm::vec3 sum = from_drawn(at, index, random);
+  Scattered sum = from_drawn(at, index, random);
   const bool one_direction =
       std::holds_alternative<DirectionalLight>(light) || std::holds_alternative<PointLight>(light);
   if (!one_direction && single_wanted(scattering_)) {
-    sum += from_fibre_direction(at, light, random);
+    sum.single += from_fibre_direction(at, light, random);
   }
   return sum;
 }
@@ -219,11 +231,18 @@ EyeSample PrecomputedIntegrator::trace(const Ray& ray, core::Random& random) con
   const glm::vec3 omega_o = glm::normalize(fibre.to_flat * glm::vec3(-ray.direction));
   const Shaded at{first.hit, cloth, fabric, fabric.point(fibre.segment, fibre.tangent, omega_o),
                   cloth.top_point(fibre, glm::dvec2(0)).value_or(fibre.world_mm)};
-  glm::vec3 radiance(0);
+  EyeSample seen;
+  describe_surface(first.hit, seen);
   for (std::size_t light = 0; light < scene_.lights.size(); ++light) {
-    radiance += from_light(at, light, random);
+    const Scattered sum = from_light(at, light, random);
+    seen.single += sum.single;
+    seen.multiple += sum.multiple;
   }
-  return {radiance, true};
+  seen.radiance = seen.single + seen.multiple;
+  if (wants_shadow_) {
+    seen.shadow = share_let_through(scene_, first.hit, random);
+  }
+  return seen;
 }
 
 }  // namespace weft::render

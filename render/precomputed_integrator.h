@@ -18,17 +18,19 @@ namespace weft::render {
 class PrecomputedIntegrator : public Integrator {
  public:
   // REQUIRES: every piece of cloth has a fabric with something precomputed.
-  PrecomputedIntegrator(const Scene& scene, Scattering scattering);
+  // With `wants_shadow`, EyeSample::shadow is filled; the radiance does not depend on it.
+  PrecomputedIntegrator(const Scene& scene, Scattering scattering, bool wants_shadow = false);
   [[nodiscard]] EyeSample trace(const Ray& ray, core::Random& random) const override;
 
  private:
   struct Shaded;
   struct Arrival;
-  [[nodiscard]] glm::vec3 from_light(const Shaded& at, std::size_t light,
+  struct Scattered;
+  [[nodiscard]] Scattered from_light(const Shaded& at, std::size_t light,
                                      core::Random& random) const;
-  [[nodiscard]] glm::vec3 from_gaussian(const Shaded& at, std::size_t light,
+  [[nodiscard]] Scattered from_gaussian(const Shaded& at, std::size_t light,
                                         core::Random& random) const;
-  [[nodiscard]] glm::vec3 from_drawn(const Shaded& at, std::size_t light,
+  [[nodiscard]] Scattered from_drawn(const Shaded& at, std::size_t light,
                                      core::Random& random) const;
   [[nodiscard]] glm::vec3 from_fibre_direction(const Shaded& at, const Light& light,
                                                core::Random& random) const;
@@ -40,6 +42,7 @@ class PrecomputedIntegrator : public Integrator {
 
   const Scene& scene_;
   Scattering scattering_;
+  bool wants_shadow_;
   // [cloths, lights]: after the transfer, where the light's direction in the flat fabric is the
   // same everywhere.
   std::vector<std::optional<CellRadiance>> cells_;

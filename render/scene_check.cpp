@@ -218,6 +218,11 @@ class Checker {
     require(picture.samples_per_pixel() <= kSampleLimit, "picture.samples_per_pixel",
             "too many; give at most " + std::to_string(kSampleLimit));
     colour(picture.background(), "picture.background");
+    for (int i = 0; i < picture.layers_size(); ++i) {
+      require(v1::PictureLayer_IsValid(picture.layers(i)) && picture.layers(i) != 0,
+              "picture.layers[" + std::to_string(i) + "]",
+              "no layer; name one, as PICTURE_LAYER_SINGLE");
+    }
   }
 
   const v1::Scene& scene_;

@@ -179,5 +179,24 @@ TEST(PrecomputedIntegrator, TheShadowOfMultipleScatteringIsSmoothedByTheGaussian
   }
 }
 
+TEST(PrecomputedIntegrator, TellsSingleFromMultipleScattering) {
+  const Scene scene = scene_with(fabric_with(0.5f),
+                                 SgLight{glm::normalize(glm::dvec3(0.3, 0.4, 1)), 300, {1, 2, 3}});
+  const PrecomputedIntegrator both(scene, Scattering::kAll, true);
+  const PrecomputedIntegrator single(scene, Scattering::kSingleOnly);
+  const PrecomputedIntegrator multiple(scene, Scattering::kMultipleOnly);
+  const Ray ray = scene.camera.ray({0.5, 0.5});
+  core::Random random(1, 2);
+  const EyeSample seen = both.trace(ray, random);
+  EXPECT_TRUE(seen.on_cloth);
+  EXPECT_EQ(seen.radiance, seen.single + seen.multiple);
+  EXPECT_EQ(seen.single, single.trace(ray, random).radiance);
+  EXPECT_EQ(seen.multiple, multiple.trace(ray, random).radiance);
+  EXPECT_GT(seen.single.x, 0);
+  EXPECT_GT(seen.multiple.x, 0);
+  EXPECT_EQ(seen.shadow, 1.0f);
+  EXPECT_LT(seen.segment, 2u);
+}
+
 }  // namespace
 }  // namespace weft::render
