@@ -8,6 +8,7 @@
 #include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/fabric_shelf.h"
+#include "cli/list_devices.h"
 #include "cli/output_file.h"
 #include "cli/render_options.h"
 #include "cli/render_report.h"
@@ -29,7 +30,8 @@ constexpr const char* kHelp =
     "Examples:\n"
     "  weft render silk.h5 -o silk.exr --png silk.png\n"
     "  weft render silk@3 --scene drape.textproto --size 1024x768 --spp 256 -o drape.exr\n"
-    "  weft render silk.h5 --integrator path --local -o reference.exr --json";
+    "  weft render silk.h5 --integrator path --local -o reference.exr --json\n"
+    "  weft render --list-devices";
 
 // A line that is redrawn, on a terminal only.
 std::function<void(double)> progress_line() {
@@ -85,6 +87,14 @@ void add_render(CLI::App& app) {
   auto options = std::make_shared<RenderOptions>();  // shared: the callback outlives this function
   CLI::App* command = add_command(app, "render", kHelp);
   add_render_options(*command, *options);
+  // Ends the parse, as --help does, so that no FABRIC is asked for; behind --json, which it reads.
+  command->add_flag_callback(
+      "--list-devices",
+      [options] {
+        list_devices(options->wants_json);
+        throw CLI::Success();
+      },
+      "List the devices that can draw, and end");
   command->callback([options] { run(*options); });
 }
 

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <numeric>
@@ -10,7 +12,10 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "render/gpu/device.h"
+#include "render/gpu/kernels.h"
+#include "render/gpu/spirv.h"
 #include "render/gpu/vulkan_failure.h"
 #include "tests/kernels/kernels.h"
 
@@ -182,6 +187,40 @@ TEST(DeviceValidation, ReportsAnOverrunInsideAKernel) {
   dispatch.push = push_constants(4U);
   (void)device->run({&dispatch, 1});
   EXPECT_THAT(device->complaints(), Contains(HasSubstr("out of bounds")));
+}
+
+TEST(DeviceValidation, SaysWhichPackageItsLayerIsIn) {
+  ASSERT_EQ(setenv("VK_LAYER_PATH", "/nowhere", 1), 0);
+  const core::Error error =
+      error_of([] { (void)Device::open("", {.validation = Validation::kOn}); });
+  ASSERT_EQ(unsetenv("VK_LAYER_PATH"), 0);
+  EXPECT_EQ(error.code(), core::Code::kFailedPrecondition);
+  EXPECT_THAT(error.what(), HasSubstr("install vulkan-validationlayers"));
+}
+
+TEST(Kernels, NeedNothingBeyondTheShaderCapability) {
+  constexpr std::uint32_t kShader = 1;
+  for (const KernelCode* code : kernels::kAll) {
+    EXPECT_EQ(spirv_capabilities(code->words), std::vector<std::uint32_t>{kShader}) << code->name;
+  }
+  for (const KernelCode* code : test_kernels::kAll) {
+    EXPECT_EQ(spirv_capabilities(code->words), std::vector<std::uint32_t>{kShader}) << code->name;
+    EXPECT_GT(spirv_buffer_count(code->words), 0U) << code->name;
+  }
+}
+
+// A kernel that nothing runs would be compiled and forgotten.
+TEST(Kernels, AreEachRunBySomething) {
+  std::string sources;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(WEFT_SOURCE_DIR "/render")) {
+    if (entry.path().extension() == ".cpp") {
+      sources += core::read_file(entry.path());
+    }
+  }
+  for (const KernelCode* code : kernels::kAll) {
+    EXPECT_NE(sources.find("kernels::" + std::string(code->name)), std::string::npos) << code->name;
+  }
 }
 
 TEST(DeviceChoice, PutsRealGpusFirst) {

@@ -1,13 +1,10 @@
 #include "render/gpu/device_choice.h"
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <optional>
 
 #include <fmt/format.h>
 
-#include "core/check.h"
 #include "core/error.h"
 #include "render/gpu/instance.h"
 
@@ -112,29 +109,7 @@ std::optional<Candidate> candidate_of(VkPhysicalDevice device) {
   return candidate;
 }
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 }  // namespace
-
-const char* kind_name(DeviceInfo::Kind kind) {
-  switch (kind) {
-    case DeviceInfo::Kind::kDiscrete:
-      return "discrete GPU";
-    case DeviceInfo::Kind::kVirtual:
-      return "virtual GPU";
-    case DeviceInfo::Kind::kIntegrated:
-      return "integrated GPU";
-    case DeviceInfo::Kind::kSoftware:
-      return "software";
-    case DeviceInfo::Kind::kOther:
-      break;
-  }
-  return "other";
-}
 
 std::vector<Candidate> candidates(VkInstance instance) {
   std::uint32_t count = 0;
@@ -174,35 +149,6 @@ std::vector<DeviceInfo> list_devices() {
     infos.push_back(candidate.info);
   }
   return infos;
-}
-
-const DeviceInfo& choose(const std::vector<DeviceInfo>& devices, const std::string& wanted) {
-  CHECK(!devices.empty());
-  if (wanted.empty() || lower(wanted) == "auto") {
-    return devices.front();
-  }
-  std::uint32_t index = 0;
-  const char* end = wanted.data() + wanted.size();
-  const auto [rest, failure] = std::from_chars(wanted.data(), end, index);
-  if (failure == std::errc() && rest == end) {
-    if (index < devices.size()) {
-      return devices[index];
-    }
-  } else {
-    for (const DeviceInfo& info : devices) {
-      if (lower(info.name).find(lower(wanted)) != std::string::npos) {
-        return info;
-      }
-    }
-  }
-  std::string there;
-  for (const DeviceInfo& info : devices) {
-    there += fmt::format("\n  {}: {} ({})", info.index, info.name, kind_name(info.kind));
-  }
-  throw core::Error(core::Code::kNotFound,
-                    fmt::format("no device '{}'; say the number or a part of the name of one of "
-                                "these:{}",
-                                wanted, there));
 }
 
 }  // namespace weft::render::gpu

@@ -22,6 +22,9 @@ struct DeviceInfo {
 // "discrete GPU", "software", ...
 [[nodiscard]] const char* kind_name(DeviceInfo::Kind kind);
 
+// "1.5 GiB".
+[[nodiscard]] std::string bytes_text(std::uint64_t bytes);
+
 // All Vulkan 1.2 devices with a compute queue and scalar block layout, real GPUs first. Throws
 // core::Error(kFailedPrecondition) when there is none, saying what to install.
 [[nodiscard]] std::vector<DeviceInfo> list_devices();

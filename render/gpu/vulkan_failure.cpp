@@ -44,18 +44,4 @@ void throw_vulkan_failure(std::int32_t result, const std::string& doing) {
   }
 }
 
-std::string bytes_text(std::uint64_t bytes) {
-  const auto value = static_cast<double>(bytes);
-  if (bytes < 1024) {
-    return fmt::format("{} bytes", bytes);
-  }
-  if (value < 0x1p20) {
-    return fmt::format("{:.1f} KiB", value / 0x1p10);
-  }
-  if (value < 0x1p30) {
-    return fmt::format("{:.1f} MiB", value / 0x1p20);
-  }
-  return fmt::format("{:.1f} GiB", value / 0x1p30);
-}
-
 }  // namespace weft::render::gpu

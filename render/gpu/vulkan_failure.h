@@ -13,7 +13,4 @@ extern const char* const kDriverAdvice;
 // missing, kInternal else. `result` is a negative VkResult, `doing` what was tried.
 [[noreturn]] void throw_vulkan_failure(std::int32_t result, const std::string& doing);
 
-// "1.5 GiB".
-[[nodiscard]] std::string bytes_text(std::uint64_t bytes);
-
 }  // namespace weft::render::gpu
