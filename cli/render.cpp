@@ -52,10 +52,10 @@ void run(const RenderOptions& options) {
   }
   const v1::Scene described = described_scene(options);
   const core::Stopwatch loading;
-  const bool precomputed = described.integration().integrator() == v1::INTEGRATOR_PRECOMPUTED;
+  const bool transfer = render::reads_transfer(described.integration().integrator());
   FabricShelf shelf(
       options.fabric, options.coordinator,
-      precomputed ? render::Fabric::Wanted::kFibresAndTransfer : render::Fabric::Wanted::kFibres);
+      transfer ? render::Fabric::Wanted::kFibresAndTransfer : render::Fabric::Wanted::kFibres);
   const render::Scene scene = render::build_scene(
       described, [&](const std::string& reference) { return shelf.take(reference).fabric; });
   for (const std::string& remark : scene.remarks) {

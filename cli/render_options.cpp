@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "render/image.h"
 #include "render/layers.h"
+#include "render/make_integrator.h"
 #include "render/scene_description.h"
 
 namespace weft::cli {
@@ -61,8 +62,7 @@ v1::Scene described_scene(const RenderOptions& options) {
     integration.set_max_scatterings(*options.max_scatterings);
   }
   if (!options.integrator.empty()) {
-    integration.set_integrator(options.integrator == "path" ? v1::INTEGRATOR_PATH
-                                                            : v1::INTEGRATOR_PRECOMPUTED);
+    integration.set_integrator(render::integrators_by_name().at(options.integrator));
   }
   if (options.local) {
     integration.set_local(true);
@@ -94,10 +94,12 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   command.add_option("--scene", options.scene, "Scene to draw (.textproto or .json)");
   command
       .add_option("--integrator", options.integrator,
-                  "path: every fibre, all bounces; precomputed: the database's transfer")
-      ->check(CLI::IsMember({"path", "precomputed"}));
-  command.add_flag("--local", options.local,
-                   "Path integrator: end paths that leave the cloth, as the precomputation does");
+                  "path: every fibre, all bounces; precomputed: the database's transfer; dual: "
+                  "dual scattering; prt: a transfer matrix per segment (slow: small crops)")
+      ->check(CLI::IsMember(render::integrators_by_name()));
+  command.add_flag(
+      "--local", options.local,
+      "Path and dual integrator: end paths that leave the cloth, as the precomputation does");
   command.add_option("--max-scatterings", options.max_scatterings,
                      "Path integrator: end paths after as many; 0: no limit");
   command.add_option("--spp", options.samples, "Samples per pixel")->check(CLI::Range(1, 1 << 20));

@@ -27,6 +27,7 @@ class Fabric {
 
   [[nodiscard]] const fabric::Tile& tile() const { return tile_; }
   [[nodiscard]] const transport::Scene& scene() const { return scene_; }
+  [[nodiscard]] const std::vector<shading::FibreBcsdf>& bcsdfs() const { return bcsdfs_; }
   [[nodiscard]] const shading::FibreBcsdf& bcsdf_of_strand(std::uint32_t strand) const {
     return bcsdfs_[tile_.strands[strand].material];
   }

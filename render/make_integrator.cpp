@@ -1,5 +1,7 @@
 #include "render/make_integrator.h"
 
+#include "render/baselines/dual_integrator.h"
+#include "render/baselines/prt_integrator.h"
 #include "render/path_integrator.h"
 #include "render/precomputed_integrator.h"
 
@@ -29,7 +31,28 @@ std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration, 
     settings.wants_shadow = wants_shadow;
     return std::make_unique<PathIntegrator>(scene, settings);
   }
+  if (integration.integrator() == v1::INTEGRATOR_DUAL) {
+    return std::make_unique<DualIntegrator>(scene, integration.local(), scattering_of(integration));
+  }
+  if (integration.integrator() == v1::INTEGRATOR_PRT) {
+    PrtSettings settings;
+    settings.seed = integration.seed();
+    return std::make_unique<PrtIntegrator>(scene, settings);
+  }
   return std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration), wants_shadow);
+}
+
+bool reads_transfer(v1::Integrator integrator) {
+  return integrator == v1::INTEGRATOR_PRECOMPUTED || integrator == v1::INTEGRATOR_PRT;
+}
+
+const std::map<std::string, v1::Integrator>& integrators_by_name() {
+  static const std::map<std::string, v1::Integrator> names = {
+      {"path", v1::INTEGRATOR_PATH},
+      {"precomputed", v1::INTEGRATOR_PRECOMPUTED},
+      {"dual", v1::INTEGRATOR_DUAL},
+      {"prt", v1::INTEGRATOR_PRT}};
+  return names;
 }
 
 }  // namespace weft::render

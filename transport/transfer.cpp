@@ -29,7 +29,8 @@ Estimate exit_estimate(Path& path, const TransferSettings& settings, core::Rando
       return {};
     }
   }
-  const bool counts = path.vertices() > 0 && (settings.lights_below || path.direction().z > 0);
+  const bool counts = (path.vertices() > 0 || settings.with_direct) &&
+                      (settings.lights_below || path.direction().z > 0);
   return counts ? Estimate{4 * kPi * path.throughput(), path.direction()} : Estimate{};
 }
 
@@ -55,6 +56,7 @@ TransferSums transfer_sums(const Scene& scene, std::span<const shading::FibreBcs
                            const CellPaths& paths, const TransferSettings& settings,
                            const Checkpoint& checkpoint) {
   CHECK(!paths.segments.empty());
+  CHECK(!settings.with_direct || settings.estimator == Estimator::kExit);
   CHECK_EQ(materials.size(), scene.tile().material_names.size());
   ShChunk chunk(settings.sh_order);
   TransferSums sums;

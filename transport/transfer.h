@@ -28,6 +28,9 @@ struct TransferSettings {
   std::uint64_t seed = 0;
   std::uint32_t max_path_length = 10000;  // scatterings; longer paths count for nothing
   bool lights_below = false;  // else light comes from the upper hemisphere only, as in the paper
+  // Light that arrives without any scattering counts too: standard PRT (Sloan et al. 2002). The
+  // exit estimator alone has it.
+  bool with_direct = false;
 };
 
 // Which paths of which cell.
