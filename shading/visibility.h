@@ -6,14 +6,15 @@
 
 #include "shading/dialect.h"
 #include "shading/error_function.h"
+#include "shading/fibre_angle.h"
 
 SHARED_BEGIN
 
 // Polar angle and azimuth in pixels: row in [0, resolution], column in [0, resolution).
 SHARED vec2 map_coordinates(vec3 w, int resolution) {
   float n = float(resolution);
-  float row = atan(sqrt(w.x * w.x + w.y * w.y), w.z) * (n / kPi);
-  float turn = atan(w.y, w.x) * (1.0f / kTwoPi);
+  float row = angle_of(sqrt(w.x * w.x + w.y * w.y), w.z) * (n / kPi);
+  float turn = angle_of(w.y, w.x) * (1.0f / kTwoPi);
   float column = (turn < 0.0f ? turn + 1.0f : turn) * n;
   return vec2(clamp(row, 0.0f, n), column < n ? column : 0.0f);
 }
