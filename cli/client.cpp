@@ -1,15 +1,6 @@
 #include "cli/client.h"
 
-#include <random>
-
-#include <fmt/format.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
-
-#include "core/error.h"
 #include "proto/address.h"
-#include "proto/limits.h"
-#include "proto/status.h"
 
 namespace weft::cli {
 
@@ -20,55 +11,6 @@ void add_coordinator_option(CLI::App& command, std::string& address) {
       ->envname("WEFT_COORDINATOR")
       ->check(CLI::Validator(v1::mistake_in_address, "", "address"))
       ->capture_default_str();
-}
-
-Client::Client(const std::string& address) : address_(address) {
-  const std::string mistake = v1::mistake_in_address(address);
-  if (!mistake.empty()) {
-    throw core::Error(core::Code::kInvalidArgument, mistake);
-  }
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
-  arguments.SetMaxSendMessageSize(v1::kMessageLimitBytes);
-  // A proxy between a person and a coordinator on the same machine is never meant.
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-  jobs_ = v1::JobService::NewStub(channel_);
-  workers_ = v1::WorkersService::NewStub(channel_);
-  catalogue_ = v1::CatalogueService::NewStub(channel_);
-}
-
-bool Client::is_worth_repeating(const grpc::Status& status) {
-  return status.error_code() == grpc::StatusCode::UNAVAILABLE ||
-         status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
-}
-
-void Client::check(const grpc::Status& status, const std::string& doing) const {
-  if (is_worth_repeating(status)) {
-    throw core::Error(
-        core::Code::kUnavailable,
-        fmt::format("cannot {}: no coordinator answers at {} ({}); start one with 'weft up', or "
-                    "name another with --coordinator or WEFT_COORDINATOR",
-                    doing, address_, status.error_message()));
-  }
-  if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED ||
-      status.error_code() == grpc::StatusCode::UNKNOWN) {
-    throw core::Error(core::Code::kUnavailable,
-                      fmt::format("cannot {}: what answers at {} is not a coordinator of this "
-                                  "weft ({}); name another with --coordinator",
-                                  doing, address_, status.error_message()));
-  }
-  v1::throw_unless_ok(status, doing);
-}
-
-void Client::set_deadline(grpc::ClientContext& context, std::chrono::seconds from_now) {
-  const gpr_timespec after = gpr_time_from_seconds(from_now.count(), GPR_TIMESPAN);
-  context.set_deadline(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), after));
-}
-
-std::string new_request_id() {
-  std::random_device device;
-  return fmt::format("{:08x}{:08x}{:08x}{:08x}", device(), device(), device(), device());
 }
 
 }  // namespace weft::cli

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cli/client.h"
-#include "cli/fetch_version.h"
+#include "client/fetch_version.h"
 #include "core/error.h"
 
 namespace weft::cli {
@@ -109,8 +109,8 @@ std::filesystem::path resolve_fabric(const std::string& reference, const std::st
                           "; name a database (.h5), or a published fabric like silk, silk@3 or "
                           "silk@latest ('weft fabrics' lists them)");
   }
-  Client client(coordinator);
-  const v1::Version version = find_version(client, reference);
+  Client connection(coordinator);
+  const v1::Version version = client::find_version(connection, reference);
   const std::filesystem::path folder = fabric_cache_folder();
   std::error_code failure;
   std::filesystem::create_directories(folder, failure);
@@ -119,8 +119,8 @@ std::filesystem::path resolve_fabric(const std::string& reference, const std::st
                       "cannot make the folder " + folder.string() + ": " + failure.message() +
                           "; set XDG_CACHE_HOME to one that can be written");
   }
-  std::filesystem::path path = folder / (version_digest(version).hex() + ".h5");
-  fetch_version(client, version, path, nullptr);
+  std::filesystem::path path = folder / (client::version_digest(version).hex() + ".h5");
+  client::fetch_version(connection, version, path, nullptr);
   trim_cache(folder, path);
   return path;
 }

@@ -9,11 +9,11 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/fabric_reference.h"
-#include "cli/fetch_version.h"
 #include "cli/output_file.h"
 #include "cli/present.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
+#include "client/fetch_version.h"
 
 namespace weft::cli {
 
@@ -33,7 +33,7 @@ struct FetchOptions {
 };
 
 // Bytes so far, on a terminal only: a fetch takes seconds.
-FetchReport terminal_report() {
+client::FetchReport terminal_report() {
   if (isatty(fileno(stderr)) != 1) {
     return nullptr;
   }
@@ -44,12 +44,13 @@ FetchReport terminal_report() {
 }
 
 void run(const FetchOptions& options) {
-  Client client(options.coordinator);
-  const v1::Version version = find_version(client, options.reference);
+  Client connection(options.coordinator);
+  const v1::Version version = client::find_version(connection, options.reference);
   const std::string output =
       options.output.empty() ? reference_text(version) + ".h5" : options.output;
   check_output_file(output);
-  const FetchOutcome outcome = fetch_version(client, version, output, terminal_report());
+  const client::FetchOutcome outcome =
+      client::fetch_version(connection, version, output, terminal_report());
   if (options.wants_json) {
     print_json({{"output", output},
                 {"was_there", outcome.was_there},

@@ -98,10 +98,6 @@ std::string state_text(v1::JobState state) {
 
 std::string time_text(std::int64_t at_ms) { return at_ms <= 0 ? "-" : date_and_time(at_ms, ' '); }
 
-std::string reference_text(const v1::Version& version) {
-  return version.fabric() + "@" + std::to_string(version.number());
-}
-
 std::string short_digest(const std::string& binary_digest) {
   return hex(binary_digest).substr(0, kShortDigits);
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/progress.h"
+#include "client/fetch_version.h"
 #include "proto/weft/v1/cluster.pb.h"
 
 // The coordinator's messages as people and programs read them.
@@ -19,8 +20,7 @@ namespace weft::cli {
 // "2026-11-22 09:04:05" (UTC); "-" for 0.
 [[nodiscard]] std::string time_text(std::int64_t at_ms);
 
-// "silk@3".
-[[nodiscard]] std::string reference_text(const v1::Version& version);
+using client::reference_text;  // "silk@3"
 
 // The first 12 hexadecimal digits.
 [[nodiscard]] std::string short_digest(const std::string& binary_digest);

@@ -8,12 +8,12 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/estimate.h"
-#include "cli/fetch_version.h"
 #include "cli/follow_job.h"
 #include "cli/output_file.h"
 #include "cli/present.h"
 #include "cli/print_json.h"
 #include "cli/quality.h"
+#include "client/fetch_version.h"
 #include "core/error.h"
 #include "fabric/description.h"
 #include "proto/limits.h"
@@ -69,16 +69,16 @@ void run(const SubmitOptions& options) {
   if (!options.output.empty()) {
     check_output_file(options.output);
   }
-  Client client(options.coordinator);
-  v1::Job job = submit(client, description, options.comment);
+  Client connection(options.coordinator);
+  v1::Job job = submit(connection, description, options.comment);
   fmt::print(stderr, "submitted {} as {}; 'weft watch {}' shows how far it is\n", job.fabric(),
              job.id(), job.id());
   if (options.is_waiting) {
-    job = follow_job(client, job.id());
+    job = follow_job(connection, job.id());
   }
   bool was_fetched = false;
   if (job.state() == v1::JOB_STATE_SUCCEEDED && !options.output.empty()) {
-    fetch_version(client, job.version(), options.output, nullptr);
+    client::fetch_version(connection, job.version(), options.output, nullptr);
     was_fetched = true;
   }
   if (options.wants_json) {

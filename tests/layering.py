@@ -15,9 +15,10 @@ MAY_INCLUDE = {
     "fabric": {"core", "proto"},
     "transport": {"core", "shading", "fabric"},
     "storage": {"core", "shading"},
+    "client": {"core", "proto", "storage"},
     "coordinator": {"core", "fabric", "proto", "storage", "shading"},
     "worker": {"core", "fabric", "shading", "transport", "proto"},
-    "render": {"core", "shading", "fabric", "transport", "storage", "proto"},
+    "render": {"core", "shading", "fabric", "transport", "storage", "proto", "client"},
 }
 MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
 

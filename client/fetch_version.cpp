@@ -1,4 +1,4 @@
-#include "cli/fetch_version.h"
+#include "client/fetch_version.h"
 
 #include <cerrno>
 #include <chrono>
@@ -12,12 +12,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "cli/present.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "storage/fabric_database.h"
 
-namespace weft::cli {
+namespace weft::client {
 
 namespace {
 
@@ -97,15 +96,15 @@ class PartFile {
 };
 
 // One stream, from what is here to wherever it breaks off.
-grpc::Status stream_rest(Client& client, const v1::Version& version, PartFile& part,
+grpc::Status stream_rest(Coordinator& coordinator, const v1::Version& version, PartFile& part,
                          const FetchReport& report) {
   v1::FetchVersionRequest request;
   request.set_reference(reference_text(version));
   request.set_offset(part.size_bytes());
   grpc::ClientContext context;
   const std::uint64_t allowance = version.size_bytes() / kSlowestBytesPerSecond;
-  Client::set_deadline(context, kStreamAllowance + std::chrono::seconds(allowance));
-  const auto reader = client.catalogue().FetchVersion(&context, request);
+  Coordinator::set_deadline(context, kStreamAllowance + std::chrono::seconds(allowance));
+  const auto reader = coordinator.catalogue().FetchVersion(&context, request);
   v1::FetchVersionResponse response;
   while (reader->Read(&response)) {
     if (part.size_bytes() + response.data().size() > version.size_bytes()) {
@@ -116,20 +115,26 @@ grpc::Status stream_rest(Client& client, const v1::Version& version, PartFile& p
                         reference_text(version) + ": more bytes came than the version has");
     }
     part.append(response.data());
-    if (report) {
-      report(part.size_bytes(), version.size_bytes());
+    try {
+      if (report) {
+        report(part.size_bytes(), version.size_bytes());
+      }
+    } catch (...) {
+      context.TryCancel();
+      (void)reader->Finish();
+      throw;
     }
   }
   return reader->Finish();
 }
 
-void fetch_rest(Client& client, const v1::Version& version, PartFile& part,
+void fetch_rest(Coordinator& coordinator, const v1::Version& version, PartFile& part,
                 const FetchReport& report) {
   int tries_left = kTriesWithoutProgress;
   std::chrono::milliseconds wait = kFirstWait;
   while (part.size_bytes() < version.size_bytes()) {
     const std::uint64_t before = part.size_bytes();
-    const grpc::Status status = stream_rest(client, version, part, report);
+    const grpc::Status status = stream_rest(coordinator, version, part, report);
     if (part.size_bytes() == version.size_bytes()) {
       return;
     }
@@ -141,7 +146,7 @@ void fetch_rest(Client& client, const v1::Version& version, PartFile& part,
       wait = kFirstWait;
     }
     if (!is_worth_repeating || --tries_left == 0) {
-      client.check(status, "fetch " + reference_text(version));
+      coordinator.check(status, "fetch " + reference_text(version));
       throw core::Error(core::Code::kDataLoss,
                         "the coordinator's file of " + reference_text(version) + " ends too early");
     }
@@ -165,11 +170,15 @@ bool is_this_version(const std::filesystem::path& path, const v1::Version& versi
 
 }  // namespace
 
-v1::Version find_version(Client& client, const std::string& reference) {
+std::string reference_text(const v1::Version& version) {
+  return version.fabric() + "@" + std::to_string(version.number());
+}
+
+v1::Version find_version(Coordinator& coordinator, const std::string& reference) {
   v1::GetVersionRequest request;
   request.set_reference(reference);
-  return client
-      .call(client.catalogue(), &v1::CatalogueService::Stub::GetVersion, request,
+  return coordinator
+      .call(coordinator.catalogue(), &v1::CatalogueService::Stub::GetVersion, request,
             "look up " + reference)
       .version();
 }
@@ -184,7 +193,7 @@ core::Digest version_digest(const v1::Version& version) {
   return *digest;
 }
 
-FetchOutcome fetch_version(Client& client, const v1::Version& version,
+FetchOutcome fetch_version(Coordinator& coordinator, const v1::Version& version,
                            const std::filesystem::path& path, const FetchReport& report) {
   const core::Digest digest = version_digest(version);
   if (is_this_version(path, version)) {
@@ -195,7 +204,7 @@ FetchOutcome fetch_version(Client& client, const v1::Version& version,
     part.clear();
   }
   const std::uint64_t bytes_kept = part.size_bytes();
-  fetch_rest(client, version, part, report);
+  fetch_rest(coordinator, version, part, report);
   if (!is_this_version(part.path(), version)) {
     part.clear();
     throw core::Error(core::Code::kDataLoss,
@@ -206,4 +215,4 @@ FetchOutcome fetch_version(Client& client, const v1::Version& version,
   return {false, bytes_kept};
 }
 
-}  // namespace weft::cli
+}  // namespace weft::client

@@ -5,19 +5,23 @@
 #include <functional>
 #include <string>
 
-#include "cli/client.h"
+#include "client/coordinator.h"
 #include "core/digest.h"
 
-namespace weft::cli {
+namespace weft::client {
+
+// "silk@3".
+[[nodiscard]] std::string reference_text(const v1::Version& version);
 
 // The version that `reference` (silk, silk@3, silk@latest) means now. Throws
 // core::Error(kInvalidArgument, kNotFound or kUnavailable).
-[[nodiscard]] v1::Version find_version(Client& client, const std::string& reference);
+[[nodiscard]] v1::Version find_version(Coordinator& coordinator, const std::string& reference);
 
 // What the version's file must hold. Throws core::Error(kDataLoss) when the answer has no digest.
 [[nodiscard]] core::Digest version_digest(const v1::Version& version);
 
-// Called with bytes that are here and bytes in all.
+// Called with bytes that are here and bytes in all. What it throws ends the fetch; what came is
+// kept.
 using FetchReport = std::function<void(std::uint64_t, std::uint64_t)>;
 
 struct FetchOutcome {
@@ -30,7 +34,7 @@ struct FetchOutcome {
 // `path` that is this very version already is kept. `report` may be empty. Throws core::Error:
 // kUnavailable when the coordinator stays away (what came is kept), kDataLoss when the bytes are
 // not the version's.
-FetchOutcome fetch_version(Client& client, const v1::Version& version,
+FetchOutcome fetch_version(Coordinator& coordinator, const v1::Version& version,
                            const std::filesystem::path& path, const FetchReport& report);
 
-}  // namespace weft::cli
+}  // namespace weft::client
