@@ -57,6 +57,20 @@ void trim_cache(const std::filesystem::path& folder, const std::filesystem::path
   }
 }
 
+// $XDG_CACHE_HOME/weft, else ~/.cache/weft; empty when neither is set.
+std::filesystem::path cache_folder() {
+  // No other thread changes the environment: weft never does.
+  const char* cache = std::getenv("XDG_CACHE_HOME");  // NOLINT(concurrency-mt-unsafe)
+  if (cache != nullptr && *cache == '/') {
+    return std::filesystem::path(cache) / "weft";
+  }
+  const char* home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe)
+  if (home == nullptr || *home == '\0') {
+    return {};
+  }
+  return std::filesystem::path(home) / ".cache" / "weft";
+}
+
 }  // namespace
 
 std::optional<FabricReference> parse_reference(std::string_view text) {
@@ -79,18 +93,18 @@ std::optional<FabricReference> parse_reference(std::string_view text) {
 }
 
 std::filesystem::path fabric_cache_folder() {
-  // No other thread changes the environment: weft never does.
-  const char* cache = std::getenv("XDG_CACHE_HOME");  // NOLINT(concurrency-mt-unsafe)
-  if (cache != nullptr && *cache == '/') {
-    return std::filesystem::path(cache) / "weft" / "fabrics";
-  }
-  const char* home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe)
-  if (home == nullptr || *home == '\0') {
+  const std::filesystem::path folder = cache_folder();
+  if (folder.empty()) {
     throw core::Error(core::Code::kFailedPrecondition,
                       "there is no folder for fetched fabrics: neither XDG_CACHE_HOME nor HOME is "
                       "set; set one, or fetch the file with 'weft fetch' and name its path");
   }
-  return std::filesystem::path(home) / ".cache" / "weft" / "fabrics";
+  return folder / "fabrics";
+}
+
+std::filesystem::path environment_cache_folder() {
+  const std::filesystem::path folder = cache_folder();
+  return folder.empty() ? folder : folder / "environments";
 }
 
 std::filesystem::path resolve_fabric(const std::string& reference, const std::string& coordinator) {

@@ -30,4 +30,7 @@ struct FabricReference {
 // Where fetched databases are kept: $XDG_CACHE_HOME/weft/fabrics, else ~/.cache/weft/fabrics.
 [[nodiscard]] std::filesystem::path fabric_cache_folder();
 
+// Where fits of environment pictures are kept, beside the former; empty when neither is set.
+[[nodiscard]] std::filesystem::path environment_cache_folder();
+
 }  // namespace weft::cli

@@ -7,6 +7,7 @@
 
 #include "cli/add_command.h"
 #include "cli/commands.h"
+#include "cli/fabric_reference.h"
 #include "cli/fabric_shelf.h"
 #include "cli/list_devices.h"
 #include "cli/output_file.h"
@@ -16,6 +17,7 @@
 #include "core/interrupt.h"
 #include "render/build_scene.h"
 #include "render/draw.h"
+#include "render/environment_cache.h"
 #include "render/make_integrator.h"
 
 namespace weft::cli {
@@ -56,8 +58,13 @@ void run(const RenderOptions& options) {
   FabricShelf shelf(
       options.fabric, options.coordinator,
       transfer ? render::Fabric::Wanted::kFibresAndTransfer : render::Fabric::Wanted::kFibres);
-  const render::Scene scene = render::build_scene(
+  render::Scene scene = render::build_scene(
       described, [&](const std::string& reference) { return shelf.take(reference).fabric; });
+  if (described.integration().environment_lights() > 0) {
+    render::EnvironmentFitSettings fit;
+    fit.most_lights = described.integration().environment_lights();
+    render::fit_environments(scene, fit, environment_cache_folder());
+  }
   for (const std::string& remark : scene.remarks) {
     fmt::print(stderr, "weft: {}\n", remark);
   }

@@ -6,6 +6,7 @@
 
 #include "cli/client.h"
 #include "core/error.h"
+#include "render/environment_fit.h"
 #include "render/image.h"
 #include "render/layers.h"
 #include "render/make_integrator.h"
@@ -72,6 +73,9 @@ v1::Scene described_scene(const RenderOptions& options) {
   } else if (options.multiple_only) {
     integration.set_scattering(v1::SCATTERING_MULTIPLE_ONLY);
   }
+  if (options.environment_lights) {
+    integration.set_environment_lights(*options.environment_lights);
+  }
   render::expand_picture_defaults(scene);
   return scene;
 }
@@ -102,6 +106,10 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
       "Path and dual integrator: end paths that leave the cloth, as the precomputation does");
   command.add_option("--max-scatterings", options.max_scatterings,
                      "Path integrator: end paths after as many; 0: no limit");
+  command
+      .add_option("--environment-lights", options.environment_lights,
+                  "Spherical Gaussians fitted to an environment; 0: draw directions from it")
+      ->check(CLI::Range(0U, render::kMostFittedLights));
   command.add_option("--spp", options.samples, "Samples per pixel")->check(CLI::Range(1, 1 << 20));
   command.add_option("--size", options.size, "WIDTHxHEIGHT in pixels");
   command.add_option("--threads", options.threads, "Threads; default: all the machine has")

@@ -24,6 +24,7 @@ struct RenderOptions {
   std::optional<std::uint32_t> samples;
   std::optional<std::uint64_t> seed;
   std::optional<std::uint32_t> max_scatterings;
+  std::optional<std::uint32_t> environment_lights;
   std::optional<float> exposure;
   unsigned threads = 0;
   bool local = false;

@@ -23,6 +23,10 @@ class Environment {
   [[nodiscard]] glm::dvec3 sample(double u1, double u2) const;
   [[nodiscard]] double pdf(const glm::dvec3& direction) const;
 
+  // The picture, scaled and without what counts as black; it is not turned.
+  [[nodiscard]] const Image& picture() const { return picture_; }
+  [[nodiscard]] double turn() const { return turn_; }
+
  private:
   struct Pixel {
     std::uint32_t x;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "render/environment_fit.h"
 #include "render/image.h"
 
 namespace weft::render {
@@ -36,6 +37,9 @@ class Checker {
       check_cloth(scene_.cloths(i), "cloths[" + std::to_string(i) + "]");
     }
     check_picture(scene_.picture());
+    require(scene_.integration().environment_lights() <= kMostFittedLights,
+            "integration.environment_lights",
+            "too many; give at most " + std::to_string(kMostFittedLights));
     return mistakes_;
   }
 

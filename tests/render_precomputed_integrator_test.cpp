@@ -7,6 +7,7 @@
 
 #include "core/half.h"
 #include "render/draw.h"
+#include "render/environment_cache.h"
 #include "render/flat_cloth.h"
 #include "render/path_integrator.h"
 #include "render/precomputed_integrator.h"
@@ -126,6 +127,30 @@ TEST(PrecomputedIntegrator, SingleScatteringOfALonelyFibreIsThePathTracers) {
       EXPECT_LT(std::fabs(a.cloth_mean[c] - b.cloth_mean[c]), 3.5 * error + 1e-3 * b.cloth_mean[c])
           << "light " << light.index() << ": " << a.cloth_mean[c] << " against " << b.cloth_mean[c];
     }
+  }
+}
+
+TEST(PrecomputedIntegrator, AnEnvironmentDrawnAsGaussiansLooksLikeOneOfDrawnDirections) {
+  Image picture(32, 16);
+  for (std::uint32_t y = 0; y < picture.height; ++y) {
+    for (std::uint32_t x = 0; x < picture.width; ++x) {
+      picture.at(x, y) = glm::vec3(0.4f, 0.6f, 1.0f) * (1.5f - 0.05f * static_cast<float>(y));
+    }
+  }
+  picture.at(20, 3) = glm::vec3(60, 50, 30);
+  const auto environment = std::make_shared<Environment>(picture, glm::vec3(1), 0.4);
+  // Followed by paths, which know nothing of Gaussians.
+  Scene scene = scene_with(fabric_with(0), EnvironmentLight{environment, true});
+  const PathIntegrator drawn(scene, {});
+  const Drawing a = drawing_of(scene, drawn, 256);
+  fit_environments(scene, {12, false}, {});
+  EXPECT_GT(scene.lights.size(), 1U);
+  const PathIntegrator fitted(scene, {});
+  const Drawing b = drawing_of(scene, fitted, 64);
+  for (int c = 0; c < 3; ++c) {
+    const double error = std::hypot(a.cloth_standard_error[c], b.cloth_standard_error[c]);
+    EXPECT_LT(error, 0.01 * a.cloth_mean[c]);
+    EXPECT_NEAR(b.cloth_mean[c], a.cloth_mean[c], 0.03 * a.cloth_mean[c]);
   }
 }
 
