@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(Shading, Parity,
                          testing::Values(Case{0, 1e-3, 13}, Case{1, 1e-2, 11}, Case{2, 1e-3, 16},
                                          Case{3, 1e-3, 15}, Case{4, 1e-3, 9}, Case{5, 1e-3, 7},
                                          Case{6, 1e-3, 16}, Case{7, 1e-2, 36}, Case{8, 1e-2, 38},
-                                         Case{9, 1e-2, 36}, Case{10, 1e-2, 38}));
+                                         Case{9, 1e-2, 36}, Case{10, 1e-2, 38}, Case{11, 1e-3, 4}));
 
 TEST_P(Parity, OfDeviceAndHost) {
   const auto device = Device::open("", {.validation = Validation::kOn});
@@ -109,6 +109,17 @@ TEST(ParityOfIntegers, IsExactAwayFromTheBordersOfPixels) {
     }
   }
   EXPECT_LT(at_border, inputs.size() / 2);
+}
+
+TEST(ParityOfIntegers, IsExactForRandomWords) {
+  constexpr int kRandom = 11;
+  const auto device = Device::open();
+  const std::vector<ParityInput> inputs = ParityInputs().make(kInputs);
+  const std::vector<ParityOutput> host = parity_on_host(kRandom, inputs);
+  const std::vector<ParityOutput> of_device =
+      parity_on_device(*device, test_kernels::parity, kRandom, inputs);
+  EXPECT_EQ(std::memcmp(of_device.data(), host.data(), kInputs * sizeof(ParityOutput)), 0);
+  EXPECT_NE(host[0].n[0], host[1].n[0]);
 }
 
 // What a software device computes must not depend on how many threads it has, nor on the run.

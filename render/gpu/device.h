@@ -127,6 +127,7 @@ class Device {
 
   // `constants` are the specialisation constants 0, 1, 2, ... REQUIRES: push_bytes is a multiple of
   // 4 and at most kPushBytesLimit; the code binds no more than `buffer_count` buffers.
+  // Throws core::Error(kResourceExhausted) when the device cannot bind as many.
   [[nodiscard]] Kernel make_kernel(const KernelCode& code, std::uint32_t buffer_count,
                                    std::uint32_t push_bytes,
                                    std::span<const std::uint32_t> constants = {});

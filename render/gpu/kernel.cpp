@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/check.h"
+#include "core/error.h"
 #include "render/gpu/device_state.h"
 #include "render/gpu/spirv.h"
 
@@ -82,6 +83,16 @@ Kernel Device::make_kernel(const KernelCode& code, std::uint32_t buffer_count,
   CHECK(!state_->lost);
   CHECK(push_bytes <= kPushBytesLimit && push_bytes % 4 == 0);
   CHECK_LE(spirv_buffer_count(code.words), buffer_count);
+  VkPhysicalDeviceProperties properties;
+  vkGetPhysicalDeviceProperties(state_->chosen.device, &properties);
+  const std::uint32_t most = std::min(properties.limits.maxPerStageDescriptorStorageBuffers,
+                                      properties.limits.maxDescriptorSetStorageBuffers);
+  if (buffer_count > most) {
+    throw core::Error(core::Code::kResourceExhausted,
+                      fmt::format("kernel {} reads and writes {} buffers, and {} takes {}; use "
+                                  "another device with --device",
+                                  code.name, buffer_count, state_->chosen.info.name, most));
+  }
   Kernel kernel;
   kernel.state_ = std::make_unique<Kernel::State>(*state_);
   kernel.state_->name = code.name;

@@ -4,6 +4,7 @@
 #ifndef WEFT_TESTS_KERNELS_PARITY_CASES_H
 #define WEFT_TESTS_KERNELS_PARITY_CASES_H
 
+#include "render/kernels/random.h"
 #include "shading/bcsdf.h"
 #include "shading/bessel.h"
 #include "shading/error_function.h"
@@ -236,7 +237,27 @@ SHARED ParityOutput parity_rotation(ParityInput x) {
   return r;
 }
 
-const int kParityCases = 11;
+// Words of a random stream, as integers.
+SHARED ParityOutput parity_random(ParityInput x) {
+  ParityOutput r = parity_nothing();
+  RandomStream stream;
+  stream.key = uvec2(floatBitsToUint(x.unit[0]), floatBitsToUint(x.a.x));
+  stream.pixel = floatBitsToUint(x.sharpness_a);
+  stream.sample_index = uint(x.count);
+  uvec4 words = random_words(stream, light_block(x.material, x.count));
+  r.n[0] = int(words.x);
+  r.n[1] = int(words.y);
+  r.n[2] = int(words.z);
+  r.n[3] = int(words.w);
+  vec4 u = random_uniforms(stream, kEyeBlock);
+  r.v[0] = u.x;
+  r.v[1] = u.y;
+  r.v[2] = u.z;
+  r.v[3] = u.w;
+  return r;
+}
+
+const int kParityCases = 12;
 
 SHARED ParityOutput parity_case(int which, ParityInput x) {
   switch (which) {
@@ -260,8 +281,10 @@ SHARED ParityOutput parity_case(int which, ParityInput x) {
       return parity_zonal(x);
     case 9:
       return parity_turns(x);
-    default:
+    case 10:
       return parity_rotation(x);
+    default:
+      return parity_random(x);
   }
 }
 

@@ -1,0 +1,58 @@
+#version 450
+#extension GL_EXT_scalar_block_layout : require
+
+// Writes the fields of one record, word by word.
+layout(local_size_x = 1) in;
+layout(constant_id = 0) const int kRecord = 0;
+
+#include "tests/kernels/record_fields.h"
+
+layout(set = 0, binding = 0, scalar) readonly buffer Hits { DeviceHit hit; };
+layout(set = 0, binding = 0, scalar) readonly buffer Cloths { DeviceCloth cloth; };
+layout(set = 0, binding = 0, scalar) readonly buffer Tetrahedra { DeviceTetrahedron tetrahedron; };
+layout(set = 0, binding = 0, scalar) readonly buffer Triangles { DeviceShellTriangle triangle; };
+layout(set = 0, binding = 0, scalar) readonly buffer Nodes { DeviceNode node; };
+layout(set = 0, binding = 0, scalar) readonly buffer OuterFaces { DeviceOuterFace outer_face; };
+layout(set = 0, binding = 1, scalar) writeonly buffer Words { uint words[]; };
+
+uint at = 0;
+
+void put(uint x) { words[at++] = x; }
+void put(int x) { put(uint(x)); }
+void put(float x) { put(floatBitsToUint(x)); }
+void put(vec2 x) { put(x.x); put(x.y); }
+void put(vec3 x) { put(x.xy); put(x.z); }
+void put(vec4 x) { put(x.xy); put(x.zw); }
+void put(uvec2 x) { put(x.x); put(x.y); }
+void put(ivec3 x) { put(x.x); put(x.y); put(x.z); }
+void put(mat3 x) { put(x[0]); put(x[1]); put(x[2]); }
+
+#define PUT_HIT(name) put(hit.name);
+#define PUT_CLOTH(name) put(cloth.name);
+#define PUT_TETRAHEDRON(name) put(tetrahedron.name);
+#define PUT_TRIANGLE(name) put(triangle.name);
+#define PUT_NODE(name) put(node.name);
+#define PUT_OUTER_FACE(name) put(outer_face.name);
+
+void main() {
+  switch (kRecord) {
+    case 0:
+      FIELDS_OF_HIT(PUT_HIT)
+      break;
+    case 1:
+      FIELDS_OF_CLOTH(PUT_CLOTH)
+      break;
+    case 2:
+      FIELDS_OF_TETRAHEDRON(PUT_TETRAHEDRON)
+      break;
+    case 3:
+      FIELDS_OF_SHELL_TRIANGLE(PUT_TRIANGLE)
+      break;
+    case 4:
+      FIELDS_OF_NODE(PUT_NODE)
+      break;
+    case 5:
+      FIELDS_OF_OUTER_FACE(PUT_OUTER_FACE)
+      break;
+  }
+}
