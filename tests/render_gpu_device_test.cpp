@@ -90,6 +90,12 @@ TEST_P(Devices, ShowADispatchWhatThoseBeforeItWrote) {
   for (int run = 0; run < 3; ++run) {
     EXPECT_EQ(device_->run(dispatches).size(), dispatches.size());
   }
+  const std::vector<KernelTime> times = device_->kernel_times();
+  ASSERT_EQ(times.size(), 1U);
+  EXPECT_EQ(times[0].name, "fill_index");
+  EXPECT_EQ(times[0].dispatches, 150U);
+  device_->forget_kernel_times();
+  EXPECT_THAT(device_->kernel_times(), IsEmpty());
   const auto values = device_->download<std::uint32_t>(even, kCount);
   for (std::uint32_t i = 0; i < kCount; ++i) {
     ASSERT_EQ(values[i], 150 * i);

@@ -82,6 +82,13 @@ struct DeviceOptions {
   bool always_stage = false;
 };
 
+// What a kernel has cost so far, all its dispatches together.
+struct KernelTime {
+  std::string name{};
+  std::uint64_t dispatches = 0;
+  double duration_ns = 0;  // on the device; 0 where it cannot tell times
+};
+
 // A headless Vulkan compute device. One thread at a time. Every function throws
 // core::Error(kResourceExhausted) with figures when memory does not suffice and kUnavailable when
 // the device was lost; after that only destruction is allowed.
@@ -137,6 +144,10 @@ class Device {
   // of work, so that they can stop in between and no watchdog fires. Throws
   // core::Error(kResourceExhausted) when a dispatch has more groups than the device takes.
   std::vector<double> run(std::span<const Dispatch> dispatches);
+  // Of every kernel that ran since the device was opened, or since the last call that forgets, by
+  // name. Kernels of one name count together.
+  [[nodiscard]] std::vector<KernelTime> kernel_times() const;
+  void forget_kernel_times();
 
  private:
   friend class Buffer;

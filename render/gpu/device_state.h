@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <string>
 
 #include "render/gpu/device.h"
 #include "render/gpu/device_choice.h"
@@ -79,6 +81,7 @@ struct Device::State {
   std::uint32_t pool_descriptors = 0;
   std::unique_ptr<Allocation> staging_buffer;
   std::uint64_t used_bytes = 0;
+  std::map<std::string, KernelTime> kernel_times;
   int children = 0;  // buffers and kernels alive
   bool lost = false;
 

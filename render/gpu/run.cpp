@@ -136,7 +136,24 @@ std::vector<double> Device::run(std::span<const Dispatch> dispatches) {
   }
   state.submit([&](VkCommandBuffer into) { state.record(into, dispatches, sets); },
                "running kernels");
-  return state.durations_ns(dispatches.size());
+  std::vector<double> durations = state.durations_ns(dispatches.size());
+  for (std::size_t i = 0; i < dispatches.size(); ++i) {
+    KernelTime& time = state.kernel_times[dispatches[i].kernel->state_->name];
+    ++time.dispatches;
+    time.duration_ns += durations[i];
+  }
+  return durations;
 }
+
+std::vector<KernelTime> Device::kernel_times() const {
+  std::vector<KernelTime> times;
+  for (const auto& [name, time] : state_->kernel_times) {
+    times.push_back(time);
+    times.back().name = name;
+  }
+  return times;
+}
+
+void Device::forget_kernel_times() { state_->kernel_times.clear(); }
 
 }  // namespace weft::render::gpu

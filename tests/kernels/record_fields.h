@@ -6,27 +6,30 @@
 #include "render/kernels/cloth_records.h"
 #include "render/kernels/hit.h"
 
+// clang-format off: it does not settle on one form of these.
+
 #define FIELDS_OF_HIT(F) \
   F(fate) F(cloth) F(fabric) F(place) F(segment) F(t_mm) F(world_mm) F(flat_mm) F(to_eye)
 
-#define FIELDS_OF_CLOTH(F)                                                        \
-  F(kind)                                                                         \
-  F(black_underlay)                                                               \
-  F(fabric) F(centre_mm) F(to_flat) F(low_mm) F(high_mm) F(contact_mm) F(step_mm) \
-      F(first_tetrahedron) F(first_triangle) F(first_node) F(first_face)
+#define FIELDS_OF_CLOTH(F) \
+  F(kind) F(black_underlay) F(fabric) F(centre_mm) F(to_flat) F(low_mm) F(high_mm) \
+  F(contact_mm) F(step_mm) F(first_tetrahedron) F(first_triangle) F(first_node) F(first_face)
 
-#define FIELDS_OF_TETRAHEDRON(F)                                                           \
-  F(corner_mm)                                                                             \
-  F(to_flat)                                                                               \
-  F(flat_mm) F(flat_tile_x) F(flat_tile_y) F(normal_0) F(normal_1) F(normal_2) F(normal_3) \
-      F(offsets_mm) F(behind_0) F(behind_1) F(behind_2) F(behind_3) F(rotation) F(bare)
+#define FIELDS_OF_TETRAHEDRON(F) \
+  F(corner_mm) F(to_flat) F(flat_mm) F(flat_tile_x) F(flat_tile_y) F(normal_0) F(normal_1) \
+  F(normal_2) F(normal_3) F(offsets_mm) F(behind_0) F(behind_1) F(behind_2) F(behind_3) \
+  F(rotation) F(bare)
 
 #define FIELDS_OF_SHELL_TRIANGLE(F) \
-  F(flat_0_mm)                      \
-  F(flat_1_mm) F(flat_2_mm) F(top_0_mm) F(top_1_mm) F(top_2_mm) F(across_0) F(across_1) F(across_2)
+  F(flat_0_mm) F(flat_1_mm) F(flat_2_mm) F(top_0_mm) F(top_1_mm) F(top_2_mm) F(across_0) \
+  F(across_1) F(across_2)
 
-#define FIELDS_OF_NODE(F) F(low_mm) F(first) F(high_mm) F(count)
+#define FIELDS_OF_NODE(F) \
+  F(low_mm) F(first) F(high_mm) F(count)
 
-#define FIELDS_OF_OUTER_FACE(F) F(a_mm) F(b_mm) F(c_mm) F(tetrahedron) F(face)
+#define FIELDS_OF_OUTER_FACE(F) \
+  F(a_mm) F(b_mm) F(c_mm) F(tetrahedron) F(face)
+
+// clang-format on
 
 #endif
