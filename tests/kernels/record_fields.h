@@ -6,7 +6,8 @@
 #include "render/kernels/cloth_records.h"
 #include "render/kernels/hit.h"
 
-// clang-format off: it does not settle on one form of these.
+// clang-format does not settle on one form of these.
+// clang-format off
 
 #define FIELDS_OF_HIT(F) \
   F(fate) F(cloth) F(fabric) F(place) F(segment) F(t_mm) F(world_mm) F(flat_mm) F(to_eye)
