@@ -8,6 +8,7 @@
 #include <glm/vec3.hpp>
 
 #include "shading/fibre_bcsdf.h"
+#include "shading/light_harmonics.h"
 #include "shading/multiple_scattering.h"
 #include "shading/single_scattering.h"
 #include "storage/fabric_database.h"
@@ -52,6 +53,12 @@ class PrecomputedFabric {
                                    glm::vec3 omega_o) const;
   [[nodiscard]] const shading::FibreBcsdf& bcsdf_of_segment(std::uint32_t segment) const;
   [[nodiscard]] const storage::FabricDatabase& database() const { return db_; }
+  // The tables as the shared text of shading/ reads them; as long as this object lives.
+  [[nodiscard]] shading::FabricTables tables() const;
+  [[nodiscard]] const std::vector<shading::FibreBcsdf>& bcsdfs() const { return bcsdfs_; }
+  [[nodiscard]] std::uint32_t material_of_segment(std::uint32_t segment) const {
+    return material_of_segment_[segment];
+  }
   [[nodiscard]] const PrecomputedSettings& settings() const { return settings_; }
 
   // Single scattering, V S cos(theta), under a directional light.
@@ -80,7 +87,6 @@ class PrecomputedFabric {
 
  private:
   void take_basis();
-  [[nodiscard]] shading::FabricTables tables() const;
 
   storage::FabricDatabase db_;
   PrecomputedSettings settings_;

@@ -68,19 +68,6 @@ SHARED ShVector transferred(FabricTables tables, int cell, int channel, ShVector
   return c_t;
 }
 
-// Harmonics of a light of unit irradiance from omega_d; none from below the horizon.
-SHARED ShVector harmonics_of_direction(vec3 omega_d) {
-  if (omega_d.z > 0.0f) {
-    return sh_evaluate(omega_d);
-  }
-  return sh_zero();
-}
-
-// ... of a normalised Gaussian light.
-SHARED ShVector harmonics_of_gaussian(SphericalGaussian light) {
-  return sh_zonal_about(sg_zonal(light.sharpness), light.axis);
-}
-
 SHARED_END
 
 #endif

@@ -70,6 +70,7 @@ Buffer::State::~State() {
   --device.children;
 }
 
+Buffer::Buffer() = default;
 Buffer::~Buffer() = default;
 Buffer::Buffer(Buffer&& other) noexcept
     : state_(std::move(other.state_)), size_bytes_(std::exchange(other.size_bytes_, 0)) {}

@@ -18,7 +18,7 @@ namespace weft::render::gpu {
 // Device.
 class Buffer {
  public:
-  Buffer() = default;
+  Buffer();
   ~Buffer();
   Buffer(Buffer&&) noexcept;
   Buffer& operator=(Buffer&&) noexcept;
@@ -36,7 +36,7 @@ class Buffer {
 // A compute pipeline. Storage buffers are bound to set 0, binding i, in the order of a dispatch.
 class Kernel {
  public:
-  Kernel() = default;
+  Kernel();
   ~Kernel();
   Kernel(Kernel&&) noexcept;
   Kernel& operator=(Kernel&&) noexcept;

@@ -17,6 +17,7 @@ Kernel::State::~State() {
   --device.children;
 }
 
+Kernel::Kernel() = default;
 Kernel::~Kernel() = default;
 Kernel::Kernel(Kernel&&) noexcept = default;
 Kernel& Kernel::operator=(Kernel&&) noexcept = default;
