@@ -24,4 +24,12 @@ const render::LoadedFabric& FabricShelf::take(const std::string& reference) {
   return fabrics_.emplace(named, render::load_fabric(path, wanted_)).first->second;
 }
 
+FabricIdentities FabricShelf::identities() const {
+  FabricIdentities identities;
+  for (const auto& [reference, loaded] : fabrics_) {
+    identities[reference] = {loaded.name, loaded.content_digest};
+  }
+  return identities;
+}
+
 }  // namespace weft::cli

@@ -3,6 +3,7 @@
 #include <map>
 #include <string>
 
+#include "cli/picture_metadata.h"
 #include "render/load_fabric.h"
 
 namespace weft::cli {
@@ -18,10 +19,8 @@ class FabricShelf {
   // Throws core::Error.
   const render::LoadedFabric& take(const std::string& reference);
 
-  // By reference, all that were taken.
-  [[nodiscard]] const std::map<std::string, render::LoadedFabric>& fabrics() const {
-    return fabrics_;
-  }
+  // All that were taken.
+  [[nodiscard]] FabricIdentities identities() const;
 
  private:
   std::string main_reference_;

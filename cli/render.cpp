@@ -1,23 +1,21 @@
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/fabric_reference.h"
 #include "cli/fabric_shelf.h"
 #include "cli/list_devices.h"
-#include "cli/output_file.h"
+#include "cli/picture_files.h"
 #include "cli/render_options.h"
 #include "cli/render_report.h"
-#include "core/clock.h"
+#include "core/error.h"
 #include "core/interrupt.h"
-#include "render/build_scene.h"
-#include "render/draw.h"
-#include "render/environment_cache.h"
+#include "render/draw_pictures.h"
 #include "render/make_integrator.h"
 
 namespace weft::cli {
@@ -35,57 +33,52 @@ constexpr const char* kHelp =
     "  weft render silk.h5 --integrator path --local -o reference.exr --json\n"
     "  weft render --list-devices";
 
-// A line that is redrawn, on a terminal only.
-std::function<void(double)> progress_line() {
-  if (isatty(fileno(stderr)) != 1) {
-    return [](double) {};
-  }
-  return [](double share) {
-    fmt::print(stderr, "\r\x1b[K{:3.0f} % drawn{}", 100 * share, share < 1 ? "" : "\n");
-  };
-}
-
-void run(const RenderOptions& options) {
-  core::Interrupt interrupt;
-  for (const std::string& file : {options.out, options.png, options.stderr_image}) {
-    if (!file.empty()) {
-      check_output_file(file);
+// Pictures drawn again from headers: a fabric may have changed under its name.
+void warn_of_changed_fabrics(const std::string& again, const FabricIdentities& now) {
+  for (const auto& [reference, recorded] : read_recipe(again).fabrics) {
+    const auto found = now.find(reference);
+    if (found != now.end() && found->second.content_digest != recorded.content_digest) {
+      fmt::print(stderr, "weft: {} is not what it was when {} was drawn; the picture will differ\n",
+                 reference, again);
     }
   }
-  const v1::Scene described = described_scene(options);
-  const core::Stopwatch loading;
-  const bool transfer = render::reads_transfer(described.integration().integrator());
-  FabricShelf shelf(
-      options.fabric, options.coordinator,
-      transfer ? render::Fabric::Wanted::kFibresAndTransfer : render::Fabric::Wanted::kFibres);
-  render::Scene scene = render::build_scene(
-      described, [&](const std::string& reference) { return shelf.take(reference).fabric; });
-  if (described.integration().environment_lights() > 0) {
-    render::EnvironmentFitSettings fit;
-    fit.most_lights = described.integration().environment_lights();
-    render::fit_environments(scene, fit, environment_cache_folder());
-  }
-  for (const std::string& remark : scene.remarks) {
-    fmt::print(stderr, "weft: {}\n", remark);
-  }
-  const render::LayerSet layers = render::layers_of(described.picture());
-  const std::unique_ptr<render::Integrator> integrator =
-      render::make_integrator(described.integration(), scene, layers.has(render::Layer::kShadow));
-  const double load_seconds = loading.seconds();
+}
 
-  render::DrawSettings settings;
-  settings.width = described.picture().width();
-  settings.height = described.picture().height();
-  settings.samples_per_pixel = described.picture().samples_per_pixel();
-  settings.seed = described.integration().seed();
+void draw_here(const RenderOptions& options, const v1::Scene& scene,
+               const std::function<bool()>& should_stop, FabricShelf& shelf, PictureFiles& files) {
+  render::PictureSettings settings;
   settings.threads = options.threads;
-  settings.layers = layers;
-  const core::Stopwatch drawing_time;
-  render::Drawing drawing = render::draw(scene.camera, *integrator, settings, progress_line(),
-                                         [&] { return interrupt.requested(); });
-  const double draw_seconds = drawing_time.seconds();
-  write_pictures(options, layers, drawing, picture_metadata(described, shelf, drawing));
-  report_drawing(options, described, drawing, load_seconds, draw_seconds);
+  settings.progressive = options.progressive;
+  settings.environment_cache = environment_cache_folder();
+  render::draw_pictures(
+      scene, settings, [&](const std::string& reference) { return shelf.take(reference).fabric; },
+      render::files_on_disk(), files, should_stop);
+}
+
+void run(RenderOptions options) {
+  if (options.fabric.empty() && options.again.empty()) {
+    throw CLI::RequiredError("fabric");
+  }
+  core::Interrupt interrupt;
+  const v1::Scene scene = described_scene(options);
+  FabricShelf shelf(options.fabric, options.coordinator,
+                    render::reads_transfer(scene.integration().integrator())
+                        ? render::Fabric::Wanted::kFibresAndTransfer
+                        : render::Fabric::Wanted::kFibres);
+  PictureFiles files(options, scene, [&] { return shelf.identities(); });
+  try {
+    draw_here(
+        options, scene, [&] { return interrupt.requested(); }, shelf, files);
+  } catch (const core::Error& error) {
+    if (error.code() != core::Code::kCancelled) {
+      throw;
+    }
+    throw core::Error(core::Code::kCancelled, "stopped; " + files.what_is_kept());
+  }
+  if (!options.again.empty()) {
+    warn_of_changed_fabrics(options.again, shelf.identities());
+  }
+  report_pictures(options, scene, files.written());
 }
 
 }  // namespace

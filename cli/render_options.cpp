@@ -1,10 +1,12 @@
 #include "cli/render_options.h"
 
 #include <cstdio>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "cli/client.h"
+#include "cli/picture_metadata.h"
 #include "core/error.h"
 #include "render/environment_fit.h"
 #include "render/image.h"
@@ -45,9 +47,17 @@ std::string mistake_in_layers(const std::string& text) {
 
 }  // namespace
 
-v1::Scene described_scene(const RenderOptions& options) {
-  v1::Scene scene =
-      options.scene.empty() ? render::default_scene() : render::load_scene(options.scene);
+v1::Scene described_scene(RenderOptions& options) {
+  v1::Scene scene;
+  if (!options.again.empty()) {
+    RecordedPicture recorded = read_recipe(options.again);
+    scene = std::move(recorded.scene);
+    options.floats = options.floats || recorded.pixels == render::ExrPixels::kFloat;
+  } else if (!options.scene.empty()) {
+    scene = render::load_scene(options.scene);
+  } else {
+    scene = render::default_scene();
+  }
   apply_size(options.size, *scene.mutable_picture());
   if (options.samples) {
     scene.mutable_picture()->set_samples_per_pixel(*options.samples);
@@ -76,14 +86,18 @@ v1::Scene described_scene(const RenderOptions& options) {
   if (options.environment_lights) {
     integration.set_environment_lights(*options.environment_lights);
   }
-  render::expand_picture_defaults(scene);
+  render::complete_scene(scene, options.fabric);
   return scene;
 }
 
 void add_render_options(CLI::App& command, RenderOptions& options) {
-  command.add_option("fabric", options.fabric, "Database, published version or description")
+  command.add_option("fabric", options.fabric,
+                     "Database, published version or description; not needed with --again");
+  command
+      .add_option("-o,--output", options.out,
+                  "Picture to write (.exr); of an animation with a place for the number of the "
+                  "frame, such as frame_%04d.exr")
       ->required();
-  command.add_option("-o,--output", options.out, "Picture to write (.exr)")->required();
   command.add_option("--png", options.png, "Preview to write as well (.png)");
   command.add_option("--exposure", options.exposure,
                      "Stops that brighten the preview; default: its mean becomes middle grey");
@@ -95,7 +109,15 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
                   "Layers of the .exr besides its colour, with commas: single, multiple, shadow, "
                   "segment, tangent, normal, variance; or all")
       ->check(mistake_in_layers);
-  command.add_option("--scene", options.scene, "Scene to draw (.textproto or .json)");
+  auto* scene = command.add_option("--scene", options.scene, "Scene to draw (.textproto or .json)");
+  command
+      .add_option("--again", options.again,
+                  "Draw what this picture (.exr) shows again, from what its header says")
+      ->excludes(scene);
+  command.add_flag("--progressive", options.progressive,
+                   "Refine the files pass by pass; Ctrl-C keeps the last whole pass");
+  command.add_flag("--resume", options.resume,
+                   "Skip pictures that are on disk already, drawn from the same scene");
   command
       .add_option("--integrator", options.integrator,
                   "path: every fibre, all bounces; precomputed: the database's transfer; dual: "

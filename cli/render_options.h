@@ -15,6 +15,8 @@ struct RenderOptions {
   std::string coordinator;
   std::string fabric;
   std::string scene;
+  std::string again;
+  std::string node;
   std::string out;
   std::string png;
   std::string stderr_image;
@@ -31,14 +33,17 @@ struct RenderOptions {
   bool single_only = false;
   bool multiple_only = false;
   bool floats = false;
+  bool progressive = false;
+  bool resume = false;
   bool wants_json = false;
 };
 
 // Declares every flag of the command; `options` must outlive it.
 void add_render_options(CLI::App& command, RenderOptions& options);
 
-// The scene as it will be drawn: the flags stand above the file, defaults are filled in. Throws
-// core::Error.
-[[nodiscard]] v1::Scene described_scene(const RenderOptions& options);
+// The scene as it will be drawn: the flags stand above the file (--scene, or the header of the
+// picture of --again), defaults are filled in. What such a header says of the pixels' type goes
+// into `options`. Throws core::Error.
+[[nodiscard]] v1::Scene described_scene(RenderOptions& options);
 
 }  // namespace weft::cli

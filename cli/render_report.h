@@ -1,26 +1,33 @@
 #pragma once
 
-#include <map>
+#include <cstdint>
 #include <string>
+#include <vector>
 
-#include "cli/fabric_shelf.h"
 #include "cli/render_options.h"
-#include "render/draw.h"
+#include "render/draw_pictures.h"
 
 namespace weft::cli {
 
-// How the picture was made, for its header; nothing about when or where.
-[[nodiscard]] std::map<std::string, std::string> picture_metadata(const v1::Scene& described,
-                                                                  const FabricShelf& shelf,
-                                                                  const render::Drawing& drawing);
+// A picture that was written, for the report.
+struct WrittenPicture {
+  std::uint32_t frame = 0;
+  std::string out;
+  std::string png;  // empty: none was asked for
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t samples_per_pixel = 0;
+  bool was_there = false;  // a finished frame of an earlier run: nothing below is known
+  glm::dvec3 cloth_mean{0, 0, 0};
+  glm::dvec3 cloth_standard_error{0, 0, 0};
+  double cloth_share = 0;
+  double load_seconds = 0;
+  double draw_seconds = 0;
+};
 
-// Writes every file that was asked for, `layers` into the picture, `attributes` in the headers of
-// those that have one. Throws core::Error(kUnavailable) when one cannot be written.
-void write_pictures(const RenderOptions& options, render::LayerSet layers, render::Drawing& drawing,
-                    const std::map<std::string, std::string>& attributes);
-
-// Says on stdout what was drawn and how long it took.
-void report_drawing(const RenderOptions& options, const v1::Scene& described,
-                    const render::Drawing& drawing, double load_seconds, double draw_seconds);
+// Says on stdout what was drawn and how long it took: of one picture its figures, of an animation a
+// line for each frame.
+void report_pictures(const RenderOptions& options, const v1::Scene& scene,
+                     const std::vector<WrittenPicture>& pictures);
 
 }  // namespace weft::cli

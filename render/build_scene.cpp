@@ -41,7 +41,7 @@ Light area_light(const v1::AreaLight& area) {
                    area.disc().radius_mm(), radiance};
 }
 
-Light light_of(const v1::Light& light, bool cut_at_horizon) {
+Light light_of(const v1::Light& light, bool cut_at_horizon, const FileSource& files) {
   switch (light.kind_case()) {
     case v1::Light::kSg: {
       const v1::SgLight& sg = light.sg();
@@ -61,8 +61,9 @@ Light light_of(const v1::Light& light, bool cut_at_horizon) {
         return UniformLight{radiance, cut_at_horizon};
       }
       return EnvironmentLight{
-          std::make_shared<Environment>(read_exr(environment.exr_file()), radiance,
-                                        environment.turn_deg() * kPi / 180),
+          std::make_shared<Environment>(
+              read_exr_bytes(files(environment.exr_file()), environment.exr_file()), radiance,
+              environment.turn_deg() * kPi / 180),
           cut_at_horizon};
     }
     default:  // the description was checked: a light has a kind
@@ -102,9 +103,9 @@ std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, std::shared_ptr<con
 }
 
 std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric,
-                                      std::vector<std::string>& remarks) {
+                                      const FileSource& files, std::vector<std::string>& remarks) {
   const v1::ShellMesh& shell = cloth.shell();
-  ObjMesh mesh = read_obj(shell.obj_file());
+  ObjMesh mesh = read_obj_text(files(shell.obj_file()), shell.obj_file());
   const double scale_mm = shell.mesh_scale_mm() > 0 ? shell.mesh_scale_mm() : 1;
   for (glm::dvec3& point : mesh.points) {
     const glm::dvec3 upright = shell.y_up() ? glm::dvec3(point.x, -point.z, point.y) : point;
@@ -183,7 +184,8 @@ Camera camera_of(const v1::Scene& description, const Cloth::Bounds& bounds) {
 
 }  // namespace
 
-Scene build_scene(const v1::Scene& description, const FabricSource& fabrics) {
+Scene build_scene(const v1::Scene& description, const FabricSource& fabrics,
+                  const FileSource& files) {
   v1::Scene whole = description;
   const v1::Scene otherwise = default_scene();
   if (whole.lights_size() == 0) {
@@ -194,12 +196,12 @@ Scene build_scene(const v1::Scene& description, const FabricSource& fabrics) {
   }
   Scene scene;
   for (const v1::Light& light : whole.lights()) {
-    scene.lights.push_back(light_of(light, whole.cut_lights_at_horizon()));
+    scene.lights.push_back(light_of(light, whole.cut_lights_at_horizon(), files));
   }
   for (const v1::Cloth& cloth : whole.cloths()) {
     std::shared_ptr<const Fabric> fabric = fabrics(cloth.fabric());
     scene.cloths.push_back(cloth.has_shell()
-                               ? shell_cloth_of(cloth, std::move(fabric), scene.remarks)
+                               ? shell_cloth_of(cloth, std::move(fabric), files, scene.remarks)
                                : flat_cloth_of(cloth, std::move(fabric)));
   }
   scene.camera = camera_of(whole, bounds_of(scene.cloths));

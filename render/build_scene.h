@@ -6,6 +6,7 @@
 
 #include "proto/weft/v1/scene.pb.h"
 #include "render/fabric.h"
+#include "render/file_source.h"
 #include "render/scene.h"
 
 namespace weft::render {
@@ -15,8 +16,9 @@ namespace weft::render {
 using FabricSource = std::function<std::shared_ptr<const Fabric>(const std::string& reference)>;
 
 // The scene that a checked description (scene_description.h, picture defaults expanded) describes:
-// reads its meshes and environment pictures, places the cloth, and frames it where the description
+// reads its meshes and pictures from `files`, places the cloth, and frames it where the description
 // has no camera. Scenes without lights or cloth get those of default_scene. Throws core::Error.
-[[nodiscard]] Scene build_scene(const v1::Scene& description, const FabricSource& fabrics);
+[[nodiscard]] Scene build_scene(const v1::Scene& description, const FabricSource& fabrics,
+                                const FileSource& files = files_on_disk());
 
 }  // namespace weft::render

@@ -29,4 +29,7 @@ inline constexpr std::size_t kTriangleLimit = 4'000'000;
 // kResourceExhausted above kTriangleLimit.
 [[nodiscard]] ObjMesh read_obj(const std::filesystem::path& path);
 
+// The same from memory; `name` stands for the file in messages.
+[[nodiscard]] ObjMesh read_obj_text(const std::string& text, const std::string& name);
+
 }  // namespace weft::render

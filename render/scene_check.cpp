@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "render/animation.h"
 #include "render/environment_fit.h"
 #include "render/image.h"
 
@@ -28,7 +29,7 @@ class Checker {
       return mistakes_;  // the other checks would list the same numbers again
     }
     if (scene_.has_camera()) {
-      check_camera(scene_.camera());
+      check_camera(scene_.camera(), "camera");
     }
     for (int i = 0; i < scene_.lights_size(); ++i) {
       check_light(scene_.lights(i), "lights[" + std::to_string(i) + "]");
@@ -40,6 +41,9 @@ class Checker {
     require(scene_.integration().environment_lights() <= kMostFittedLights,
             "integration.environment_lights",
             "too many; give at most " + std::to_string(kMostFittedLights));
+    if (scene_.has_animation()) {
+      check_keys(scene_.animation());
+    }
     return mistakes_;
   }
 
@@ -87,8 +91,7 @@ class Checker {
             "a negative colour; give r, g, b from 0 up");
   }
 
-  void check_camera(const v1::Camera& camera) {
-    const std::string path = "camera";
+  void check_camera(const v1::Camera& camera, const std::string& path) {
     require(camera.has_position() == camera.has_look_at(), path,
             "position or look_at alone; give both, or neither to have the cloth framed");
     position(camera.position(), path + ".position");
@@ -211,6 +214,18 @@ class Checker {
     } else {
       mistakes_.push_back({path, "no shape; give flat { } or shell { obj_file: \"...\" }"});
     }
+  }
+
+  void check_keys(const v1::Animation& animation) {
+    for (int i = 0; i < animation.camera_size(); ++i) {
+      check_camera(animation.camera(i).camera(),
+                   "animation.camera[" + std::to_string(i) + "].camera");
+    }
+    for (int i = 0; i < animation.lights_size(); ++i) {
+      check_light(animation.lights(i).value(), "animation.lights[" + std::to_string(i) + "].value");
+    }
+    const core::Mistakes further = check_animation(scene_);
+    mistakes_.insert(mistakes_.end(), further.begin(), further.end());
   }
 
   void check_picture(const v1::Picture& picture) {

@@ -56,6 +56,13 @@ v1::Scene parse_scene(std::string_view text, const std::string& name,
       relative_to(folder, *light.mutable_environment()->mutable_exr_file());
     }
   }
+  const int keys = scene.animation().lights_size();
+  for (int i = 0; i < keys; ++i) {
+    v1::LightKey& key = *scene.mutable_animation()->mutable_lights(i);
+    if (key.value().has_environment()) {
+      relative_to(folder, *key.mutable_value()->mutable_environment()->mutable_exr_file());
+    }
+  }
   for (v1::Cloth& cloth : *scene.mutable_cloths()) {
     if (cloth.has_shell()) {
       relative_to(folder, *cloth.mutable_shell()->mutable_obj_file());
@@ -75,6 +82,22 @@ v1::Scene default_scene() {
   cloth.set_black_underlay(true);
   scene.set_cut_lights_at_horizon(true);
   return scene;
+}
+
+void complete_scene(v1::Scene& scene, const std::string& fabric) {
+  const v1::Scene otherwise = default_scene();
+  if (scene.lights_size() == 0) {
+    *scene.mutable_lights() = otherwise.lights();
+  }
+  if (scene.cloths_size() == 0) {
+    *scene.mutable_cloths() = otherwise.cloths();
+  }
+  for (v1::Cloth& cloth : *scene.mutable_cloths()) {
+    if (cloth.fabric().empty()) {
+      cloth.set_fabric(fabric);
+    }
+  }
+  expand_picture_defaults(scene);
 }
 
 void expand_picture_defaults(v1::Scene& scene) {

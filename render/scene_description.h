@@ -23,6 +23,10 @@ namespace weft::render {
 // light from the upper left and a softer one opposite, black underneath.
 [[nodiscard]] v1::Scene default_scene();
 
+// Writes out what the scene leaves to defaults: lights, cloth, the fabric of each piece of cloth
+// (`fabric` where none is named), picture and integration. The camera stays as it is.
+void complete_scene(v1::Scene& scene, const std::string& fabric);
+
 // Sets every field of `picture` and `integration` that is not set to its default.
 void expand_picture_defaults(v1::Scene& scene);
 
