@@ -19,8 +19,6 @@
 namespace weft::render {
 namespace {
 
-constexpr std::uint32_t kPurposeOfEyeRays = 0x65796573;  // "eyes"
-
 // Sums over the samples of one pixel; those that met no cloth have radiance of their own.
 struct PixelSums {
   glm::dvec3 radiance{0, 0, 0};

@@ -13,6 +13,9 @@
 
 namespace weft::render {
 
+// core::derive_seed of DrawSettings::seed, for the samples of pixels.
+inline constexpr std::uint32_t kPurposeOfEyeRays = 0x65796573;  // "eyes"
+
 struct DrawSettings {
   std::uint32_t width = 512;
   std::uint32_t height = 512;

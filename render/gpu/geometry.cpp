@@ -9,8 +9,10 @@
 #include <glm/common.hpp>
 #include <glm/matrix.hpp>
 
+#include "core/check.h"
 #include "core/error.h"
 #include "render/gpu/bounds_tree.h"
+#include "render/gpu/nearest_volume.h"
 
 namespace weft::render::gpu {
 namespace {
@@ -106,8 +108,31 @@ DeviceShellTriangle packed(const ShellTriangle& triangle, const glm::dvec3& cent
           triangle.across[2]};
 }
 
+// Appends one fabric's grid, whose indices then count from the beginning of all.
+void append(GeometryArrays& arrays, const FabricGrid& grid) {
+  shading::DeviceFabric fabric = grid.fabric;
+  fabric.first_brick = static_cast<int>(arrays.bricks.size());
+  const auto first_voxel = static_cast<std::int32_t>(arrays.voxels.size());
+  const auto first_entry = static_cast<std::uint32_t>(arrays.entries.size());
+  const auto first_capsule = static_cast<std::uint32_t>(arrays.capsules.size());
+  for (const std::int32_t brick : grid.bricks) {
+    arrays.bricks.push_back(brick < 0 ? brick : brick + first_voxel);
+  }
+  for (const std::uint32_t voxel : grid.voxels) {
+    arrays.voxels.push_back(voxel + first_entry);
+  }
+  for (const std::uint32_t entry : grid.entries) {
+    arrays.entries.push_back(entry + first_capsule);
+  }
+  arrays.capsules.insert(arrays.capsules.end(), grid.capsules.begin(), grid.capsules.end());
+  arrays.segments.insert(arrays.segments.end(), grid.segments.begin(), grid.segments.end());
+  arrays.fabrics.push_back(fabric);
+}
+
 class Packer {
  public:
+  explicit Packer(const GeometrySettings& settings) : settings_(settings) {}
+
   GeometryArrays pack(std::span<const std::unique_ptr<Cloth>> cloths) {
     for (const auto& cloth : cloths) {
       add(*cloth);
@@ -131,20 +156,33 @@ class Packer {
   }
 
   int index_of(const Fabric& fabric) {
-    const auto found = std::find(arrays_.fabrics.begin(), arrays_.fabrics.end(), &fabric);
-    const auto index = found - arrays_.fabrics.begin();
-    if (found == arrays_.fabrics.end()) {
-      arrays_.fabrics.push_back(&fabric);
+    const auto found = std::find(arrays_.sources.begin(), arrays_.sources.end(), &fabric);
+    const auto index = found - arrays_.sources.begin();
+    if (found == arrays_.sources.end()) {
+      arrays_.sources.push_back(&fabric);
+      append(arrays_, build_fabric_grid(fabric.tile(), settings_.grid));
+      if (settings_.nearest_volume) {
+        add_nearest_volume(fabric.tile(), arrays_.fabrics.back());
+      }
     }
     return static_cast<int>(index);
+  }
+
+  void add_nearest_volume(const fabric::Tile& tile, shading::DeviceFabric& fabric) {
+    const NearestVolume volume =
+        build_nearest_volume(tile, static_cast<double>(fabric.z_low_mm),
+                             static_cast<double>(fabric.z_high_mm), settings_.most_nearest_bytes);
+    fabric.nearest_voxels = volume.voxels;
+    fabric.first_nearest = next_index(arrays_.nearest.size(), volume.segments.size());
+    arrays_.nearest.insert(arrays_.nearest.end(), volume.segments.begin(), volume.segments.end());
   }
 
   static int next_index(std::size_t size, std::size_t more) {
     constexpr auto kMost = static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
     if (size + more > kMost) {
       throw core::Error(core::Code::kResourceExhausted,
-                        "the meshes of the scene have more than " + std::to_string(kMost) +
-                            " tetrahedra or faces; use coarser meshes");
+                        "the scene has more than " + std::to_string(kMost) +
+                            " tetrahedra, faces or voxels; use coarser meshes or fewer fabrics");
     }
     return static_cast<int>(size);
   }
@@ -201,13 +239,27 @@ class Packer {
     }
   }
 
+  const GeometrySettings& settings_;
   GeometryArrays arrays_;
 };
 
+template <typename T>
+std::uint64_t bytes_of(const std::vector<T>& values) {
+  return values.size() * sizeof(T);
+}
+
 }  // namespace
 
-GeometryArrays pack_geometry(std::span<const std::unique_ptr<Cloth>> cloths) {
-  return Packer().pack(cloths);
+std::uint64_t GeometryArrays::size_bytes() const {
+  return bytes_of(cloths) + bytes_of(tetrahedra) + bytes_of(shell_triangles) + bytes_of(nodes) +
+         bytes_of(outer_faces) + bytes_of(fabrics) + bytes_of(bricks) + bytes_of(voxels) +
+         bytes_of(entries) + bytes_of(capsules) + bytes_of(segments) + bytes_of(nearest);
+}
+
+GeometryArrays pack_geometry(std::span<const std::unique_ptr<Cloth>> cloths,
+                             const GeometrySettings& settings) {
+  CHECK(!cloths.empty());
+  return Packer(settings).pack(cloths);
 }
 
 }  // namespace weft::render::gpu

@@ -41,6 +41,7 @@ SHARED vec3 point_at(LocalRay ray, float t_mm) { return ray.origin_mm + t_mm * r
 struct OuterHit {
   float t_mm;  // along the local ray
   int face;    // counted from the piece's first; -1: none
+  int steps;   // from box to box that it took
 };
 
 // Where a ray meets a box, as (enter, leave); it misses where enter > leave. Slabs after Kay and
@@ -83,11 +84,13 @@ SHARED OuterHit outer_face_between(Geometry g, int cloth, LocalRay ray, vec2 spa
   OuterHit nearest;
   nearest.t_mm = span_mm.y;
   nearest.face = -1;
+  nearest.steps = 0;
   int stack[kTreeStack];
   int depth = 1;
   stack[0] = 0;
   while (depth > 0 && !(any && nearest.face >= 0)) {
     --depth;
+    ++nearest.steps;
     DeviceNode node = node_at(g, piece.first_node + stack[depth]);
     vec2 passage = box_passage(ray, node.low_mm, node.high_mm);
     if (!(passage.x <= passage.y) || passage.x > nearest.t_mm || passage.y < span_mm.x) {
