@@ -76,6 +76,12 @@ RECORD_TEST(TetrahedronIsLaidOutAlike, 2, DeviceTetrahedron, FIELDS_OF_TETRAHEDR
 RECORD_TEST(ShellTriangleIsLaidOutAlike, 3, DeviceShellTriangle, FIELDS_OF_SHELL_TRIANGLE)
 RECORD_TEST(NodeIsLaidOutAlike, 4, DeviceNode, FIELDS_OF_NODE)
 RECORD_TEST(OuterFaceIsLaidOutAlike, 5, DeviceOuterFace, FIELDS_OF_OUTER_FACE)
+RECORD_TEST(FabricSizesAreLaidOutAlike, 6, DeviceFabricSizes, FIELDS_OF_FABRIC_SIZES)
+RECORD_TEST(SegmentIsLaidOutAlike, 7, DeviceSegment, FIELDS_OF_SEGMENT)
+RECORD_TEST(LightIsLaidOutAlike, 8, DeviceLight, FIELDS_OF_LIGHT)
+RECORD_TEST(SampleIsLaidOutAlike, 9, DeviceSample, FIELDS_OF_SAMPLE)
+RECORD_TEST(PixelIsLaidOutAlike, 10, DevicePixel, FIELDS_OF_PIXEL)
+RECORD_TEST(ShadingCallIsLaidOutAlike, 11, ShadingCall, FIELDS_OF_SHADING_CALL)
 
 }  // namespace
 }  // namespace weft::render::gpu

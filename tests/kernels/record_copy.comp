@@ -13,6 +13,12 @@ layout(set = 0, binding = 0, scalar) readonly buffer Tetrahedra { DeviceTetrahed
 layout(set = 0, binding = 0, scalar) readonly buffer Triangles { DeviceShellTriangle triangle; };
 layout(set = 0, binding = 0, scalar) readonly buffer Nodes { DeviceNode node; };
 layout(set = 0, binding = 0, scalar) readonly buffer OuterFaces { DeviceOuterFace outer_face; };
+layout(set = 0, binding = 0, scalar) readonly buffer FabricSizes { DeviceFabricSizes fabric_sizes; };
+layout(set = 0, binding = 0, scalar) readonly buffer Segments { DeviceSegment segment; };
+layout(set = 0, binding = 0, scalar) readonly buffer Lights { DeviceLight light; };
+layout(set = 0, binding = 0, scalar) readonly buffer Samples { DeviceSample eye_sample; };
+layout(set = 0, binding = 0, scalar) readonly buffer Pixels { DevicePixel pixel; };
+layout(set = 0, binding = 0, scalar) readonly buffer Calls { ShadingCall call; };
 layout(set = 0, binding = 1, scalar) writeonly buffer Words { uint words[]; };
 
 uint at = 0;
@@ -33,6 +39,12 @@ void put(mat3 x) { put(x[0]); put(x[1]); put(x[2]); }
 #define PUT_TRIANGLE(name) put(triangle.name);
 #define PUT_NODE(name) put(node.name);
 #define PUT_OUTER_FACE(name) put(outer_face.name);
+#define PUT_FABRIC_SIZES(name) put(fabric_sizes.name);
+#define PUT_SEGMENT(name) put(segment.name);
+#define PUT_LIGHT(name) put(light.name);
+#define PUT_SAMPLE(name) put(eye_sample.name);
+#define PUT_PIXEL(name) put(pixel.name);
+#define PUT_SHADING_CALL(name) put(call.name);
 
 void main() {
   switch (kRecord) {
@@ -53,6 +65,24 @@ void main() {
       break;
     case 5:
       FIELDS_OF_OUTER_FACE(PUT_OUTER_FACE)
+      break;
+    case 6:
+      FIELDS_OF_FABRIC_SIZES(PUT_FABRIC_SIZES)
+      break;
+    case 7:
+      FIELDS_OF_SEGMENT(PUT_SEGMENT)
+      break;
+    case 8:
+      FIELDS_OF_LIGHT(PUT_LIGHT)
+      break;
+    case 9:
+      FIELDS_OF_SAMPLE(PUT_SAMPLE)
+      break;
+    case 10:
+      FIELDS_OF_PIXEL(PUT_PIXEL)
+      break;
+    case 11:
+      FIELDS_OF_SHADING_CALL(PUT_SHADING_CALL)
       break;
   }
 }

@@ -5,6 +5,7 @@
 
 #include "render/kernels/cloth_records.h"
 #include "render/kernels/hit.h"
+#include "render/kernels/shading_records.h"
 
 // clang-format does not settle on one form of these.
 // clang-format off
@@ -30,6 +31,30 @@
 
 #define FIELDS_OF_OUTER_FACE(F) \
   F(a_mm) F(b_mm) F(c_mm) F(tetrahedron) F(face)
+
+#define FIELDS_OF_FABRIC_SIZES(F) \
+  F(resolution) F(ssdf_pairs) F(gaussians) F(sharpness) F(harmonics) F(quads) \
+  F(transfer_is_half) F(sigma_shadow_mm) F(first_axis) F(first_material) F(first_lobe) \
+  F(first_c_s)
+
+#define FIELDS_OF_SEGMENT(F) \
+  F(cell) F(material_and_rotation) F(open_share) F(tangent)
+
+#define FIELDS_OF_LIGHT(F) \
+  F(kind) F(cut_at_horizon) F(place) F(edge_a) F(edge_b) F(sharpness) F(colour)
+
+#define FIELDS_OF_SAMPLE(F) \
+  F(single) F(multiple) F(arriving) F(through)
+
+#define FIELDS_OF_PIXEL(F) \
+  F(single) F(single_rest) F(multiple) F(multiple_rest) F(squared) F(squared_rest) F(shadow) \
+  F(shadow_rest) F(on_cloth) F(on_nothing) F(cloth) F(fabric) F(place) F(segment)
+
+#define FIELDS_OF_SHADING_CALL(F) \
+  F(batch.seed) F(batch.width) F(batch.band_top) F(batch.left) F(batch.top) F(batch.columns) \
+  F(batch.rows) F(batch.first_sample) F(batch.sample_count) F(batch.capacity) F(cloths) \
+  F(cloth) F(fabric) F(light) F(is_first) F(wanted) F(transferred) F(first_cell) \
+  F(first_of_page) F(cells) F(blend_low) F(blend_high) F(gamma_method)
 
 // clang-format on
 
