@@ -167,11 +167,12 @@ void paths(benchmark::State& state) {
   material.beta_r = 0.12f;
   material.beta_tt = 0.17f;
   const std::vector<shading::FibreBcsdf> materials{shading::FibreBcsdf(material)};
-  std::vector<std::uint32_t> segments;
+  transport::CellSegments cell;
   for (std::uint64_t i = 0; i < 64; ++i) {
-    segments.push_back(some_segment(0) + static_cast<std::uint32_t>(i) < satin().segment_count()
-                           ? some_segment(0) + static_cast<std::uint32_t>(i)
-                           : some_segment(0));
+    cell.segments.push_back(some_segment(0) + static_cast<std::uint32_t>(i) <
+                                    satin().segment_count()
+                                ? some_segment(0) + static_cast<std::uint32_t>(i)
+                                : some_segment(0));
   }
   transport::TransferSettings settings;
   settings.estimator =
@@ -179,7 +180,7 @@ void paths(benchmark::State& state) {
   std::uint64_t first = 0;
   for (auto unused : state) {
     benchmark::DoNotOptimize(
-        transport::transfer_sums(scene(), materials, {0, segments, first, 1024}, settings));
+        transport::transfer_sums(scene(), materials, {0, &cell, first, 1024}, settings));
     first += 1024;
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(first));

@@ -1,6 +1,8 @@
 #include "cli/render_options.h"
 
 #include <cstdio>
+#include <map>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -34,6 +36,15 @@ void apply_size(const std::string& text, v1::Picture& picture) {
   }
   picture.set_width(width);
   picture.set_height(height);
+}
+
+v1::TermSource named_source(const std::string& name, v1::TermSource otherwise) {
+  static const std::map<std::string, v1::TermSource> kSources{
+      {"database", v1::TERM_SOURCE_DATABASE},
+      {"cell", v1::TERM_SOURCE_CELL},
+      {"segment", v1::TERM_SOURCE_SEGMENT}};
+  const auto found = kSources.find(name);
+  return found == kSources.end() ? otherwise : found->second;
 }
 
 std::string mistake_in_layers(const std::string& text) {
@@ -86,6 +97,8 @@ v1::Scene described_scene(RenderOptions& options) {
   if (options.environment_lights) {
     integration.set_environment_lights(*options.environment_lights);
   }
+  integration.set_single_from(named_source(options.single_from, integration.single_from()));
+  integration.set_multiple_from(named_source(options.multiple_from, integration.multiple_from()));
   render::complete_scene(scene, options.fabric);
   return scene;
 }
@@ -142,6 +155,16 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   command
       .add_flag("--multiple-only", options.multiple_only, "Light scattered more than once alone")
       ->excludes(single);
+  command
+      .add_option("--single-from", options.single_from,
+                  "Where light scattered once is taken from: the database, or rays traced from\n"
+                  "where the segment's tables were baked (CPU)")
+      ->check(CLI::IsMember({"database", "segment"}));
+  command
+      .add_option("--multiple-from", options.multiple_from,
+                  "Where the rest is taken from: the database, paths from the hit's segment, or\n"
+                  "paths from segments drawn from its cell (CPU)")
+      ->check(CLI::IsMember({"database", "cell", "segment"}));
   add_coordinator_option(command, options.coordinator);
   command.add_flag("--json", options.wants_json, "Print one JSON value on stdout");
 }

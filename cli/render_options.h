@@ -28,6 +28,8 @@ struct RenderOptions {
   std::optional<std::uint32_t> max_scatterings;
   std::optional<std::uint32_t> environment_lights;
   std::optional<float> exposure;
+  std::string single_from;
+  std::string multiple_from;
   unsigned threads = 0;
   bool local = false;
   bool single_only = false;

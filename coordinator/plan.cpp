@@ -21,7 +21,7 @@ constexpr std::uint32_t kPathsPerShard = 16'384;
 
 // Enters every shard's digest. Raised when a baker gives other bytes for the same spec and inputs,
 // so that results of the older program are not taken for the newer one's.
-constexpr std::uint64_t kResultsRevision = 2;
+constexpr std::uint64_t kResultsRevision = 3;
 
 // What the description's one seed is used for; the numbers are part of every result.
 enum class Purpose : std::uint32_t {
@@ -48,6 +48,9 @@ std::uint32_t grid_rays(v1::Quality quality) {
       return 1U << 18;
   }
 }
+
+// A cell's segments are drawn by these counts: thousands for a cell together.
+constexpr std::uint32_t kSeenRaysPerSegment = 16;
 
 std::uint64_t ceil_div(std::uint64_t count, std::uint64_t divisor) {
   return (count + divisor - 1) / divisor;
@@ -100,6 +103,7 @@ Stage grid_stage(const v1::FabricDescription& description, const core::Digest& t
   spec.set_cell_length_mfp(expanded(settings.cell_length_mfp(), "cell_length_mfp"));
   spec.set_rays(grid_rays(settings.quality()));
   spec.set_seed(seed_for(description, Purpose::kGrid));
+  spec.set_seen_rays_per_segment(kSeenRaysPerSegment);
   return stage;
 }
 

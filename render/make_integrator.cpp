@@ -19,6 +19,17 @@ Scattering scattering_of(const v1::Integration& integration) {
   }
 }
 
+TermSource source_of(v1::TermSource source) {
+  switch (source) {
+    case v1::TERM_SOURCE_CELL:
+      return TermSource::kCell;
+    case v1::TERM_SOURCE_SEGMENT:
+      return TermSource::kSegment;
+    default:
+      return TermSource::kDatabase;
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration, const Scene& scene,
@@ -39,7 +50,10 @@ std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration, 
     settings.seed = integration.seed();
     return std::make_unique<PrtIntegrator>(scene, settings);
   }
-  return std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration), wants_shadow);
+  const TermSources sources{source_of(integration.single_from()),
+                            source_of(integration.multiple_from())};
+  return std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration), wants_shadow,
+                                                 sources);
 }
 
 bool reads_transfer(v1::Integrator integrator) {

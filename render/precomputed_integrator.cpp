@@ -48,11 +48,14 @@ struct PrecomputedIntegrator::Scattered {
 };
 
 PrecomputedIntegrator::PrecomputedIntegrator(const Scene& scene, Scattering scattering,
-                                             bool wants_shadow)
-    : scene_(scene), scattering_(scattering), wants_shadow_(wants_shadow) {
+                                             bool wants_shadow, const TermSources& sources)
+    : scene_(scene), scattering_(scattering), wants_shadow_(wants_shadow), sources_(sources) {
   for (const auto& cloth : scene.cloths) {
     const PrecomputedFabric* fabric = cloth->fabric().precomputed();
     CHECK(fabric != nullptr);
+    if (sources.single != TermSource::kDatabase || sources.multiple != TermSource::kDatabase) {
+      traced_.emplace_back(cloth->fabric());
+    }
     const std::optional<glm::mat3> rotation = cloth->constant_rotation();
     for (const Light& light : scene.lights) {
       std::optional<CellRadiance> radiance;
@@ -204,9 +207,48 @@ glm::vec3 PrecomputedIntegrator::from_fibre_direction(const Shaded& at, const Li
   return sample.weight * met->radiance * static_cast<float>(pdf / (pdf + met->pdf));
 }
 
+// All terms by one direction towards the light.
+PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_traced(const Shaded& at,
+                                                                    std::size_t index,
+                                                                    core::Random& random) const {
+  const double u1 = random.uniform_double();
+  const double u2 = random.uniform_double();
+  const LightSample sample = sample_light(scene_.lights[index], at.hit.fibre.world_mm, u1, u2);
+  const glm::vec3 omega_d = glm::normalize(at.hit.fibre.to_flat * glm::vec3(sample.direction));
+  if (sample.radiance == glm::vec3(0) || !(omega_d.z > 0)) {
+    return {};
+  }
+  Arrival arrival{sample.direction, std::nullopt};
+  if (sample.distance_mm < kInfinity) {
+    arrival.point_mm = at.hit.fibre.world_mm + sample.distance_mm * sample.direction;
+  }
+  const TracedTerms& traced = traced_[at.hit.cloth];
+  const glm::vec3 weight = sample.radiance / static_cast<float>(sample.pdf);
+  Scattered sum;
+  if (single_wanted(scattering_) && reaches(at.top_mm, arrival)) {
+    sum.single = traced.single(at.point, omega_d) * weight;
+  }
+  if (multiple_wanted(scattering_) && reaches(neighbour(at, random), arrival)) {
+    sum.multiple = traced.multiple(at.point, omega_d, sources_.multiple, random) * weight;
+  }
+  return sum;
+}
+
 PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_light(const Shaded& at,
                                                                    std::size_t index,
                                                                    core::Random& random) const {
+  Scattered sum = from_database(at, index, random);
+  if (!traced_.empty()) {
+    const Scattered traced = from_traced(at, index, random);
+    sum.single = sources_.single == TermSource::kDatabase ? sum.single : traced.single;
+    sum.multiple = sources_.multiple == TermSource::kDatabase ? sum.multiple : traced.multiple;
+  }
+  return sum;
+}
+
+PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_database(const Shaded& at,
+                                                                      std::size_t index,
+                                                                      core::Random& random) const {
   const Light& light = scene_.lights[index];
   if (std::holds_alternative<SgLight>(light)) {
     return from_gaussian(at, index, random);

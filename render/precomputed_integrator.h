@@ -6,6 +6,7 @@
 #include "render/integrator.h"
 #include "render/precomputed_fabric.h"
 #include "render/scene.h"
+#include "render/traced_terms.h"
 
 namespace weft::render {
 
@@ -19,7 +20,9 @@ class PrecomputedIntegrator : public Integrator {
  public:
   // REQUIRES: every piece of cloth has a fabric with something precomputed.
   // With `wants_shadow`, EyeSample::shadow is filled; the radiance does not depend on it.
-  PrecomputedIntegrator(const Scene& scene, Scattering scattering, bool wants_shadow = false);
+  // `sources` says where each part of the light is taken from.
+  PrecomputedIntegrator(const Scene& scene, Scattering scattering, bool wants_shadow = false,
+                        const TermSources& sources = {});
   [[nodiscard]] EyeSample trace(const Ray& ray, core::Random& random) const override;
 
  private:
@@ -28,6 +31,10 @@ class PrecomputedIntegrator : public Integrator {
   struct Scattered;
   [[nodiscard]] Scattered from_light(const Shaded& at, std::size_t light,
                                      core::Random& random) const;
+  [[nodiscard]] Scattered from_database(const Shaded& at, std::size_t light,
+                                        core::Random& random) const;
+  [[nodiscard]] Scattered from_traced(const Shaded& at, std::size_t light,
+                                      core::Random& random) const;
   [[nodiscard]] Scattered from_gaussian(const Shaded& at, std::size_t light,
                                         core::Random& random) const;
   [[nodiscard]] Scattered from_drawn(const Shaded& at, std::size_t light,
@@ -43,6 +50,8 @@ class PrecomputedIntegrator : public Integrator {
   const Scene& scene_;
   Scattering scattering_;
   bool wants_shadow_;
+  TermSources sources_;
+  std::vector<TracedTerms> traced_;  // by cloth; empty when everything is looked up
   // [cloths, lights]: after the transfer, where the light's direction in the flat fabric is the
   // same everywhere.
   std::vector<std::optional<CellRadiance>> cells_;

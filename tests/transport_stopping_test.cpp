@@ -22,18 +22,18 @@ class TransportStopping : public testing::Test {
     material.beta_tt = 0.17f;
     material.gamma_tt = 0.45f;
     materials_.emplace_back(material);
-    segments_.resize(tile_.segment_count());
-    std::iota(segments_.begin(), segments_.end(), 0u);
+    cell_.segments.resize(tile_.segment_count());
+    std::iota(cell_.segments.begin(), cell_.segments.end(), 0u);
     settings_.sh_order = 2;
     settings_.seed = 6;
   }
 
   [[nodiscard]] TransferSums first(std::uint64_t paths) const {
-    return transfer_sums(scene_, materials_, {5, segments_, 0, paths}, settings_);
+    return transfer_sums(scene_, materials_, {5, &cell_, 0, paths}, settings_);
   }
   [[nodiscard]] TransferSums to_error(double target, std::uint64_t most,
                                       const Checkpoint& checkpoint = {}) const {
-    return transfer_sums_to_error(scene_, materials_, {5, segments_, 0, most}, settings_, target,
+    return transfer_sums_to_error(scene_, materials_, {5, &cell_, 0, most}, settings_, target,
                                   checkpoint);
   }
   [[nodiscard]] static double error_of(const TransferSums& sums) {
@@ -43,7 +43,7 @@ class TransportStopping : public testing::Test {
   fabric::Tile tile_ = test::crossed_layers(4, 8, 0.02f, 4);
   Scene scene_{tile_};
   std::vector<shading::FibreBcsdf> materials_;
-  std::vector<std::uint32_t> segments_;
+  CellSegments cell_;
   TransferSettings settings_;
 };
 

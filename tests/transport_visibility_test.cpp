@@ -8,6 +8,7 @@
 
 #include "core/random.h"
 #include "tests/transport_tiles.h"
+#include "transport/bake_point.h"
 #include "transport/signed_distance.h"
 #include "transport/sphere.h"
 #include "transport/visibility.h"
@@ -115,10 +116,10 @@ TEST(TransportVisibility, Bits_AreWhatRaysSay) {
   std::uint32_t visible = 0;
   for (std::uint32_t k = 0; k < tile.segment_count(); k += 97) {
     const auto bits = visibility_bits(scene, k, kResolution);
+    const auto [origin, own] = bake_point(scene, k);
     for (std::uint32_t p = 0; p < kResolution * kResolution; ++p) {
-      const bool blocked =
-          scene.occluded(tile.wrapped_midpoint(k), glm::vec3(pixel_direction(p, kResolution)),
-                         std::numeric_limits<float>::infinity(), scene.own_copy(k));
+      const bool blocked = scene.occluded(origin, glm::vec3(pixel_direction(p, kResolution)),
+                                          std::numeric_limits<float>::infinity(), own);
       different += is_visible(bits, p) == blocked ? 1 : 0;
       visible += blocked ? 0 : 1;
     }

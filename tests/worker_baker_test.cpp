@@ -1,4 +1,5 @@
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <thread>
 
@@ -37,6 +38,7 @@ BakerContext grid_context() {
   context.spec.mutable_grid()->set_cell_length_mfp(2);
   context.spec.mutable_grid()->set_rays(4096);
   context.spec.mutable_grid()->set_seed(5);
+  context.spec.mutable_grid()->set_seen_rays_per_segment(16);
   context.shard_count = 1;
   context.inputs = {fabric::encode_tile(tile_of_test())};
   return context;
@@ -115,6 +117,9 @@ TEST(WorkerBaker, Grid_HasWhatItsSpecPromises) {
   EXPECT_EQ(per_axis[0], 2 * std::max(1.0f, std::round(0.5f / (2 * path[0]))));
   const auto cells = v1::array_of<std::uint32_t>(result, "cell_of_segment");
   EXPECT_EQ(cells.size(), tile_of_test().segment_count());
+  const auto seen = v1::array_of<std::uint32_t>(result, "seen");
+  ASSERT_EQ(seen.size(), cells.size());
+  EXPECT_LE(std::accumulate(seen.begin(), seen.end(), 0u), 16 * seen.size());
 }
 
 TEST(WorkerBaker, Visibility_IsAStratifiedSampleOfTheTile) {

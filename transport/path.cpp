@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "transport/bake_point.h"
+
 namespace weft::transport {
 
 namespace {
@@ -14,11 +16,11 @@ constexpr float kFar = std::numeric_limits<float>::infinity();
 
 Path::Path(const Scene& scene, std::span<const shading::FibreBcsdf> materials,
            std::uint32_t segment, glm::vec3 direction)
-    : scene_(scene),
-      materials_(materials),
-      position_mm_(scene.tile().wrapped_midpoint(segment)),
-      direction_(direction),
-      own_(scene.own_copy(segment)) {}
+    : scene_(scene), materials_(materials), direction_(direction) {
+  const BakePoint start = bake_point(scene, segment);
+  position_mm_ = start.position_mm;
+  own_ = start.own;
+}
 
 bool Path::advance() {
   const auto hit = scene_.closest(position_mm_, direction_, kFar, own_);

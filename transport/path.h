@@ -18,7 +18,7 @@ namespace weft::transport {
 // ignored by the ray that leaves it.
 class Path {
  public:
-  // Starts on the axis at the segment's midpoint, its own strand ignored. `materials` by the tile's
+  // Starts at the segment's bake point, its own strand ignored. `materials` by the tile's
   // material index; both references must outlive the path.
   Path(const Scene& scene, std::span<const shading::FibreBcsdf> materials, std::uint32_t segment,
        glm::vec3 direction);
@@ -42,7 +42,7 @@ class Path {
  private:
   const Scene& scene_;
   std::span<const shading::FibreBcsdf> materials_;
-  glm::vec3 position_mm_;
+  glm::vec3 position_mm_{0, 0, 0};
   glm::vec3 direction_;
   StrandCopy own_;  // relative to the tile that holds position_mm_
   glm::vec3 throughput_{1, 1, 1};

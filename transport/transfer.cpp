@@ -55,18 +55,17 @@ Estimate light_estimate(Path& path, const TransferSettings& settings, core::Rand
 TransferSums transfer_sums(const Scene& scene, std::span<const shading::FibreBcsdf> materials,
                            const CellPaths& paths, const TransferSettings& settings,
                            const Checkpoint& checkpoint) {
-  CHECK(!paths.segments.empty());
   CHECK(!settings.with_direct || settings.estimator == Estimator::kExit);
+  CHECK(paths.segments != nullptr && !paths.segments->segments.empty());
   CHECK_EQ(materials.size(), scene.tile().material_names.size());
   ShChunk chunk(settings.sh_order);
   TransferSums sums;
   sums.paths = paths.count;
   sums.sum.assign(chunk.size(), 0);
   sums.sum_of_squares.assign(chunk.size(), 0);
-  const auto segment_count = static_cast<std::uint32_t>(paths.segments.size());
   for (std::uint64_t i = paths.first; i < paths.first + paths.count; ++i) {
     core::Random random(settings.seed, paths.cell, i);
-    const std::uint32_t segment = paths.segments[random.below(segment_count)];
+    const std::uint32_t segment = paths.segments->draw(random);
     const float u_z = random.uniform();
     const glm::vec3 arrival = uniform_direction(u_z, random.uniform());
     Path path(scene, materials, segment, arrival);

@@ -7,6 +7,7 @@
 #include "shading/fibre_bcsdf.h"
 #include "transport/checkpoint.h"
 #include "transport/scene.h"
+#include "transport/seen_segments.h"
 
 namespace weft::transport {
 
@@ -36,7 +37,7 @@ struct TransferSettings {
 // Which paths of which cell.
 struct CellPaths {
   std::uint32_t cell = 0;
-  std::span<const std::uint32_t> segments;  // whose midpoints lie in the cell; not empty
+  const CellSegments* segments = nullptr;  // whose midpoints lie in the cell; not empty
   std::uint64_t first = 0;
   std::uint64_t count = 0;
 };

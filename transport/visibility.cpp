@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/check.h"
+#include "transport/bake_point.h"
 #include "transport/sphere.h"
 
 namespace weft::transport {
@@ -11,8 +12,7 @@ namespace weft::transport {
 std::vector<std::uint8_t> visibility_bits(const Scene& scene, std::uint32_t segment,
                                           std::uint32_t resolution, const Checkpoint& checkpoint) {
   CHECK_EQ(resolution % 8, 0U);
-  const glm::vec3 origin = scene.tile().wrapped_midpoint(segment);
-  const StrandCopy own = scene.own_copy(segment);
+  const auto [origin, own] = bake_point(scene, segment);
   constexpr float kFar = std::numeric_limits<float>::infinity();
   std::vector<std::uint8_t> bits(std::size_t{resolution} * resolution / 8);
   std::size_t pixel = 0;

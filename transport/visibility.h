@@ -9,10 +9,10 @@
 
 namespace weft::transport {
 
-// Which directions leave the cloth from segment k's midpoint without meeting another fibre
+// Which directions leave the cloth from segment k's bake point without meeting another fibre
 // (Khungurn et al. 2017, section 4.1), in endless cloth: resolution^2 bits of the image of the
 // sphere in sphere.h, bit i % 8 of byte i / 8 for pixel i, 1 where the sky is seen. Only the
-// segment's own strand is ignored; a midpoint inside another fibre sees nothing.
+// segment's own strand is ignored; a point inside another fibre sees nothing.
 // REQUIRES: resolution is a multiple of 8.
 [[nodiscard]] std::vector<std::uint8_t> visibility_bits(const Scene& scene, std::uint32_t segment,
                                                         std::uint32_t resolution,

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "core/check.h"
+#include "transport/bake_point.h"
 #include "transport/capsule_shadow.h"
 #include "transport/capsule_tree.h"
 #include "transport/cover_mask.h"
@@ -21,12 +22,11 @@ class Painter {
  public:
   Painter(const Scene& scene, const CapsuleTree& tree, const SphereGrid& grid,
           std::uint32_t segment)
-      : scene_(scene),
-        tree_(tree),
-        grid_(grid),
-        eye_mm_(scene.tile().wrapped_midpoint(segment)),
-        own_(scene.own_copy(segment)),
-        mask_(grid.resolution) {}
+      : scene_(scene), tree_(tree), grid_(grid), mask_(grid.resolution) {
+    const BakePoint point = bake_point(scene, segment);
+    eye_mm_ = point.position_mm;
+    own_ = point.own;
+  }
 
   // Blocks in square rings round the eye, near ones first, until none further out can add anything.
   CoverMask paint_all(const Checkpoint& checkpoint) {
@@ -132,7 +132,7 @@ class Painter {
   const Scene& scene_;
   const CapsuleTree& tree_;
   const SphereGrid& grid_;
-  glm::vec3 eye_mm_;
+  glm::vec3 eye_mm_{0, 0, 0};
   StrandCopy own_;
   CoverMask mask_;
   ImageRegion region_;  // scratch

@@ -87,14 +87,14 @@ void probe_paths(core::Hasher& hasher, const transport::Scene& scene) {
   material.c_r = {0.1f, 0.2f, 0.3f};
   material.c_tt = {0.7f, 0.8f, 0.9f};
   const std::vector<shading::FibreBcsdf> materials{shading::FibreBcsdf(material)};
-  std::vector<std::uint32_t> segments(scene.tile().segment_count());
-  for (std::uint32_t k = 0; k < segments.size(); ++k) {
-    segments[k] = k;
+  transport::CellSegments cell;
+  for (std::uint32_t k = 0; k < scene.tile().segment_count(); ++k) {
+    cell.segments.push_back(k);
   }
   transport::TransferSettings settings;
   settings.seed = kSeed;
   const transport::TransferSums sums =
-      transport::transfer_sums(scene, materials, {0, segments, 0, 256}, settings);
+      transport::transfer_sums(scene, materials, {0, &cell, 0, 256}, settings);
   for (const std::int64_t value : sums.sum) {
     hasher.number(static_cast<std::uint64_t>(value));
   }

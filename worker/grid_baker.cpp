@@ -5,6 +5,7 @@
 
 #include "proto/arrays.h"
 #include "transport/cell_grid.h"
+#include "transport/seen_segments.h"
 #include "worker/bakers.h"
 
 namespace weft::worker {
@@ -17,6 +18,8 @@ class GridBaker : public Baker {
       : spec_(context.spec.grid()), shard_count_(context.shard_count) {
     require_inputs(context, "grid", 1);
     require(spec_.rays() > 0, "grid", "rays must be positive");
+    require(spec_.seen_rays_per_segment() > 0 && spec_.seen_rays_per_segment() <= 1024, "grid",
+            "seen_rays_per_segment must be between 1 and 1024");
     require(spec_.cell_length_mfp() > 0 && std::isfinite(spec_.cell_length_mfp()), "grid",
             "cell_length_mfp must be positive");
     input_ = std::make_unique<TileScene>(context.inputs[0]);
@@ -29,6 +32,8 @@ class GridBaker : public Baker {
                                                      stop_point(should_stop));
     const transport::CellGrid grid =
         transport::make_cell_grid(input_->tile, path_mm * spec_.cell_length_mfp());
+    const std::vector<std::uint32_t> seen = transport::seen_segments(
+        input_->scene, spec_.seen_rays_per_segment(), spec_.seed(), stop_point(should_stop));
     std::vector<std::uint32_t> coordinates;
     coordinates.reserve(3 * grid.cell_coordinates.size());
     for (const glm::uvec3& cell : grid.cell_coordinates) {
@@ -42,6 +47,7 @@ class GridBaker : public Baker {
     v1::add_array<std::uint32_t>(arrays, "cells_per_axis", {3}, per_axis);
     v1::add_array<std::uint32_t>(arrays, "cell_of_segment", {grid.cell_of_segment.size()},
                                  grid.cell_of_segment);
+    v1::add_array<std::uint32_t>(arrays, "seen", {seen.size()}, seen);
     v1::add_array<std::uint32_t>(arrays, "cell_coordinates", {grid.cell_coordinates.size(), 3},
                                  coordinates);
     return v1::serialize(arrays);

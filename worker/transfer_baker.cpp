@@ -59,7 +59,7 @@ class TransferBaker : public Baker {
     read_cells(context.inputs[1]);
     blocks_per_cell_ = (std::uint64_t{spec_.paths_per_cell()} + spec_.paths_per_shard() - 1) /
                        spec_.paths_per_shard();
-    require(shard_count_ == segments_of_cell_.size() * blocks_per_cell_, "transfer",
+    require(shard_count_ == cells_.size() * blocks_per_cell_, "transfer",
             "the number of shards is not cells times blocks per cell");
   }
 
@@ -69,7 +69,7 @@ class TransferBaker : public Baker {
     const std::uint64_t cell = shard / blocks_per_cell_;
     transport::CellPaths paths;
     paths.cell = static_cast<std::uint32_t>(cell);
-    paths.segments = segments_of_cell_[cell];
+    paths.segments = &cells_[cell];
     paths.first = shard % blocks_per_cell_ * spec_.paths_per_shard();
     paths.count =
         std::min<std::uint64_t>(spec_.paths_per_shard(), spec_.paths_per_cell() - paths.first);
@@ -107,18 +107,8 @@ class TransferBaker : public Baker {
     if (shape.empty() || cell_of_segment.size() != input_->tile.segment_count()) {
       throw core::Error(core::Code::kDataLoss, "the grid was not made for this tile");
     }
-    segments_of_cell_.resize(shape[0]);
-    for (std::uint32_t k = 0; k < cell_of_segment.size(); ++k) {
-      if (cell_of_segment[k] >= segments_of_cell_.size()) {
-        throw core::Error(core::Code::kDataLoss, "the grid names a cell that it does not have");
-      }
-      segments_of_cell_[cell_of_segment[k]].push_back(k);
-    }
-    for (const auto& segments : segments_of_cell_) {
-      if (segments.empty()) {
-        throw core::Error(core::Code::kDataLoss, "the grid has a cell without segments");
-      }
-    }
+    cells_ = transport::segments_by_cell(cell_of_segment, shape[0],
+                                         v1::array_of<std::uint32_t>(arrays, "seen"));
   }
 
   v1::TransferSpec spec_;
@@ -126,7 +116,7 @@ class TransferBaker : public Baker {
   std::uint64_t blocks_per_cell_ = 1;
   std::unique_ptr<TileScene> input_;
   std::vector<shading::FibreBcsdf> materials_;
-  std::vector<std::vector<std::uint32_t>> segments_of_cell_;
+  std::vector<transport::CellSegments> cells_;
 };
 
 }  // namespace
