@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "fabric/tile.h"
@@ -32,8 +31,6 @@ class Fabric {
   [[nodiscard]] const shading::FibreBcsdf& bcsdf_of_strand(std::uint32_t strand) const {
     return bcsdfs_[tile_.strands[strand].material];
   }
-  // By the tile's material.
-  [[nodiscard]] std::span<const shading::FibreBcsdf> bcsdfs() const { return bcsdfs_; }
   // Nothing when it was not wanted, or there is none.
   [[nodiscard]] const PrecomputedFabric* precomputed() const { return precomputed_.get(); }
 

@@ -31,9 +31,10 @@ void SegmentTransfer::make(std::uint32_t segment, Matrix& matrix) const {
   settings.sh_order = settings_.sh_order;
   settings.seed = settings_.seed;
   settings.with_direct = true;
+  const transport::CellSegments only{{segment}, {}};
   transport::CellPaths paths;
   paths.cell = segment;
-  paths.segments = {&segment, 1};
+  paths.segments = &only;
   paths.count = settings_.paths;
   const transport::TransferSums sums =
       transport::transfer_sums(fabric_.scene(), fabric_.bcsdfs(), paths, settings);
