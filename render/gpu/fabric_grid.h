@@ -13,7 +13,7 @@ struct GridSettings {
   std::uint64_t most_bytes = std::uint64_t{96} << 20;
   // Capsules that a voxel among the fibres lists on average, as far as memory permits: more make
   // the march slower, fewer the grid larger.
-  double capsules_per_voxel = 2;
+  double capsules_per_voxel = 3;
 };
 
 // The arrays of render/kernels/grid_records.h for one fabric. Indices count from these arrays' own
