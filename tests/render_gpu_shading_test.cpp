@@ -96,7 +96,7 @@ Shaded shade_twice(const Scene& scene, Scattering scattering, std::uint32_t samp
   TestDevice& with = test_device();
   Device& device = *with.device;
   std::vector<DeviceFabricTables> tables;
-  for (const Fabric* fabric : geometry.fabrics) {
+  for (const Fabric* fabric : geometry.sources) {
     tables.emplace_back(device, pack_fabric(*fabric));
   }
   const std::vector<Buffer> solid = [&] {
