@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "render/gpu/device.h"
+#include "render/gpu/geometry.h"
 #include "tests/kernels/kernels.h"
 #include "tests/kernels/record_fields.h"
 
@@ -82,6 +83,10 @@ RECORD_TEST(LightIsLaidOutAlike, 8, DeviceLight, FIELDS_OF_LIGHT)
 RECORD_TEST(SampleIsLaidOutAlike, 9, DeviceSample, FIELDS_OF_SAMPLE)
 RECORD_TEST(PixelIsLaidOutAlike, 10, DevicePixel, FIELDS_OF_PIXEL)
 RECORD_TEST(ShadingCallIsLaidOutAlike, 11, ShadingCall, FIELDS_OF_SHADING_CALL)
+RECORD_TEST(FabricIsLaidOutAlike, 12, DeviceFabric, FIELDS_OF_FABRIC)
+RECORD_TEST(CapsuleIsLaidOutAlike, 13, DeviceCapsule, FIELDS_OF_CAPSULE)
+RECORD_TEST(EyeTaskIsLaidOutAlike, 14, EyeTask, FIELDS_OF_EYE_TASK)
+RECORD_TEST(EyeSearchIsLaidOutAlike, 15, EyeSearch, FIELDS_OF_EYE_SEARCH)
 
 }  // namespace
 }  // namespace weft::render::gpu

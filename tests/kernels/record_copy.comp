@@ -5,6 +5,11 @@
 layout(local_size_x = 1) in;
 layout(constant_id = 0) const int kRecord = 0;
 
+// Nothing here reads these.
+#define SOLID_BINDING 2
+#define GRID_BINDING 7
+#include "render/kernels/grid.glsl"
+
 #include "tests/kernels/record_fields.h"
 
 layout(set = 0, binding = 0, scalar) readonly buffer Hits { DeviceHit hit; };
@@ -19,6 +24,10 @@ layout(set = 0, binding = 0, scalar) readonly buffer Lights { DeviceLight light;
 layout(set = 0, binding = 0, scalar) readonly buffer Samples { DeviceSample eye_sample; };
 layout(set = 0, binding = 0, scalar) readonly buffer Pixels { DevicePixel pixel; };
 layout(set = 0, binding = 0, scalar) readonly buffer Calls { ShadingCall call; };
+layout(set = 0, binding = 0, scalar) readonly buffer Fabrics { DeviceFabric fabric; };
+layout(set = 0, binding = 0, scalar) readonly buffer Capsules { DeviceCapsule capsule; };
+layout(set = 0, binding = 0, scalar) readonly buffer Tasks { EyeTask task; };
+layout(set = 0, binding = 0, scalar) readonly buffer Searches { EyeSearch search; };
 layout(set = 0, binding = 1, scalar) writeonly buffer Words { uint words[]; };
 
 uint at = 0;
@@ -45,6 +54,10 @@ void put(mat3 x) { put(x[0]); put(x[1]); put(x[2]); }
 #define PUT_SAMPLE(name) put(eye_sample.name);
 #define PUT_PIXEL(name) put(pixel.name);
 #define PUT_SHADING_CALL(name) put(call.name);
+#define PUT_FABRIC(name) put(fabric.name);
+#define PUT_CAPSULE(name) put(capsule.name);
+#define PUT_EYE_TASK(name) put(task.name);
+#define PUT_EYE_SEARCH(name) put(search.name);
 
 void main() {
   switch (kRecord) {
@@ -83,6 +96,18 @@ void main() {
       break;
     case 11:
       FIELDS_OF_SHADING_CALL(PUT_SHADING_CALL)
+      break;
+    case 12:
+      FIELDS_OF_FABRIC(PUT_FABRIC)
+      break;
+    case 13:
+      FIELDS_OF_CAPSULE(PUT_CAPSULE)
+      break;
+    case 14:
+      FIELDS_OF_EYE_TASK(PUT_EYE_TASK)
+      break;
+    case 15:
+      FIELDS_OF_EYE_SEARCH(PUT_EYE_SEARCH)
       break;
   }
 }

@@ -1,9 +1,11 @@
 // The fields of every struct that crosses between host and device, in order; read by C++ and GLSL
-// alike (record_copy.comp, render_gpu_records_test.cpp).
+// alike (record_copy.comp, render_gpu_records_test.cpp). The including program defines what
+// render/kernels/eye_ray.h asks for.
 #ifndef WEFT_TESTS_KERNELS_RECORD_FIELDS_H
 #define WEFT_TESTS_KERNELS_RECORD_FIELDS_H
 
 #include "render/kernels/cloth_records.h"
+#include "render/kernels/eye_ray.h"
 #include "render/kernels/hit.h"
 #include "render/kernels/shading_records.h"
 
@@ -55,6 +57,22 @@
   F(batch.rows) F(batch.first_sample) F(batch.sample_count) F(batch.capacity) F(cloths) \
   F(cloth) F(fabric) F(light) F(is_first) F(wanted) F(transferred) F(first_cell) \
   F(first_of_page) F(cells) F(blend_low) F(blend_high) F(gamma_method)
+
+#define FIELDS_OF_FABRIC(F) \
+  F(size_mm) F(z_low_mm) F(z_high_mm) F(voxel_mm) F(bricks) F(first_brick) F(nearest_voxels) \
+  F(first_nearest)
+
+#define FIELDS_OF_CAPSULE(F) \
+  F(middle_mm) F(radius_mm) F(axis) F(half_length_mm)
+
+#define FIELDS_OF_EYE_TASK(F) \
+  F(position_mm) F(perspective) F(forward) F(width) F(across) F(height) F(down) F(cloths) \
+  F(seed) F(left) F(top) F(columns) F(rows) F(first_sample) F(sample_count) F(resumes) \
+  F(nearest_samples)
+
+#define FIELDS_OF_EYE_SEARCH(F) \
+  F(cloth) F(walk.state) F(walk.place) F(walk.entered_by) F(walk.behind) F(walk.t_mm) \
+  F(walk.start_mm) F(walk.end_mm)
 
 // clang-format on
 
