@@ -13,6 +13,7 @@
 #include "cli/print_json.h"
 #include "render/image.h"
 #include "render/png.h"
+#include "render/similarity.h"
 
 namespace weft::cli {
 
@@ -54,6 +55,7 @@ void run(const CompareOptions& options) {
   const render::Image image = render::read_exr(options.image, options.layer);
   const render::Image reference = render::read_exr(options.reference, options.layer);
   const render::Comparison comparison = render::compare(image, reference);
+  const double similarity = render::structural_similarity(image, reference);
   const double scale = options.scale ? *options.scale : render::natural_scale(image, reference);
   if (!options.out.empty()) {
     render::write_png(options.out, image.width, image.height,
@@ -62,6 +64,7 @@ void run(const CompareOptions& options) {
   if (options.wants_json) {
     print_json({{"rmse", comparison.rmse_all},
                 {"rmse_per_channel", triple(comparison.rmse)},
+                {"structural_similarity", similarity},
                 {"mean", triple(comparison.mean)},
                 {"reference_mean", triple(comparison.reference_mean)},
                 {"relative_mean_error", relative_errors(comparison)},
@@ -78,6 +81,7 @@ void run(const CompareOptions& options) {
   fmt::print("relative error of the mean: R {}, G {}, B {}\n",
              percent(comparison.relative_mean_error[0]), percent(comparison.relative_mean_error[1]),
              percent(comparison.relative_mean_error[2]));
+  fmt::print("structural similarity as displayed: {:.4f}\n", similarity);
   if (comparison.non_finite_pixels > 0) {
     fmt::print("{} pixels that are not finite were left out\n", comparison.non_finite_pixels);
   }

@@ -62,7 +62,8 @@ fabric::Tile tile_of(const storage::FabricDatabase& database) {
   return tile;
 }
 
-std::unique_ptr<Fabric> Fabric::from_database(storage::FabricDatabase database, Wanted wanted) {
+std::unique_ptr<Fabric> Fabric::from_database(storage::FabricDatabase database, Wanted wanted,
+                                              const PrecomputedSettings& settings) {
   require(database.materials.size() == database.material_names.size(),
           "its materials and their names differ in number");
   std::vector<shading::FibreBcsdf> bcsdfs;
@@ -71,7 +72,7 @@ std::unique_ptr<Fabric> Fabric::from_database(storage::FabricDatabase database, 
   }
   auto result = std::make_unique<Fabric>(tile_of(database), std::move(bcsdfs));
   if (wanted == Wanted::kFibresAndTransfer) {
-    result->precomputed_ = std::make_unique<PrecomputedFabric>(std::move(database));
+    result->precomputed_ = std::make_unique<PrecomputedFabric>(std::move(database), settings);
   }
   return result;
 }

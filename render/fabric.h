@@ -22,8 +22,8 @@ class Fabric {
   // The tile and the materials of a database, and its precomputed visibility and transfer where
   // they are wanted. Throws core::Error(kDataLoss) when its arrays contradict one another.
   enum class Wanted { kFibres, kFibresAndTransfer };
-  [[nodiscard]] static std::unique_ptr<Fabric> from_database(storage::FabricDatabase database,
-                                                             Wanted wanted);
+  [[nodiscard]] static std::unique_ptr<Fabric> from_database(
+      storage::FabricDatabase database, Wanted wanted, const PrecomputedSettings& settings = {});
 
   [[nodiscard]] const fabric::Tile& tile() const { return tile_; }
   [[nodiscard]] const transport::Scene& scene() const { return scene_; }
