@@ -127,6 +127,27 @@ TEST(DualFibre, SpreadLightScattersAsTheIntegralOverItsDirections) {
   }
 }
 
+TEST(DualFibre, ReturnedLightCarriesThePowerOfItsAttenuation) {
+  // Over all directions of the eye, as seen by light across narrow fibres: A_b and no more.
+  shading::FibreMaterial narrow = grey();
+  narrow.beta_r = narrow.beta_tt = 0.02f;
+  const DualFibre fibre{shading::FibreBcsdf(narrow)};
+  double power = 0;
+  constexpr int kThetas = 400;
+  constexpr int kPhis = 16;
+  for (int t = 0; t < kThetas; ++t) {
+    const double theta = 0.6 * (2 * (t + 0.5) / kThetas - 1);
+    for (int p = 0; p < kPhis; ++p) {
+      const double straight = static_cast<double>(kPi) * (2 * (p + 0.5) / kPhis - 1);
+      const float seen =
+          fibre.returned(0, static_cast<float>(theta), static_cast<float>(straight), 0).x;
+      power += static_cast<double>(seen) * std::cos(theta) * std::cos(theta) * 1.2 / kThetas * 2 *
+               static_cast<double>(kPi) / kPhis;
+    }
+  }
+  EXPECT_NEAR(power, DualFibre::backward_attenuation(fibre.averages(0)).x, 0.01 * power);
+}
+
 // `count` straight fibres along x, one above the other, in a tile much wider than they.
 Scene column_of_fibres(int count, const DirectionalLight& light) {
   fabric::Tile tile = test::empty_tile(1, 1);

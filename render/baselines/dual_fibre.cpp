@@ -158,7 +158,7 @@ glm::vec3 DualFibre::returned(float theta_d, float theta_o, float straight, floa
                         std::max(b + b3 * (2 * std::sqrt(vf) + 3 * std::sqrt(vb)), 1e-12f);
   const float spread = sigma_b * sigma_b + variance;
   const float lobe = gaussian(theta_o + theta_d, spread) / power_of_gaussian(theta_d, spread);
-  return backward_attenuation(at) * (backward * 2 / kPi * lobe * std::cos(theta_d));
+  return backward_attenuation(at) * (backward / kPi * lobe * std::cos(theta_d));
 }
 
 }  // namespace weft::render

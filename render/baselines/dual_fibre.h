@@ -41,10 +41,12 @@ class DualFibre {
                                     float variance) const;
 
   // Light that goes on into the cloth behind and comes back after one or three backward
-  // scatterings: f_back cos(theta_d) with f_back = 2 A_b g / (pi cos^2 theta) in the backward half
+  // scatterings: f_back cos(theta_d) with f_back = A_b g / (pi cos^2 theta) in the backward half
   // circle (eqs. 12 to 18), A_b = a_b a_f^2 / (1 - a_f^2) + a_b^3 a_f^2 / (1 - a_f^2)^3, where
-  // g / cos^2 theta is written N / G as above. `variance` is 0 for light that came directly;
-  // otherwise that of scattered(), and the backward half circles are averaged over its azimuths.
+  // g / cos^2 theta is written N / G as above. In print f_back is twice that, which sends back
+  // twice the power of A_b; path tracing is on the side of the power in most fabrics
+  // (docs/accuracy.md). `variance` is 0 for light that came directly; otherwise that of
+  // scattered(), and the backward half circles are averaged over its azimuths.
   [[nodiscard]] glm::vec3 returned(float theta_d, float theta_o, float straight,
                                    float variance) const;
 
