@@ -2,11 +2,9 @@
 
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <mutex>
 #include <vector>
 
-#include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -15,29 +13,10 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/random.h"
+#include "render/pixel_sums.h"
 
 namespace weft::render {
 namespace {
-
-// Sums over the samples of one pixel; those that met no cloth have radiance of their own.
-struct PixelSums {
-  glm::dvec3 radiance{0, 0, 0};
-  glm::dvec3 squared{0, 0, 0};
-  glm::dvec3 cloth_radiance{0, 0, 0};
-  glm::dvec3 cloth_squared{0, 0, 0};
-  std::uint32_t on_cloth = 0;
-};
-
-// Sums over the samples of one pixel for its layers, and what its first sample saw.
-struct LayerSums {
-  glm::dvec3 single{0, 0, 0};
-  glm::dvec3 multiple{0, 0, 0};
-  double shadow = 0;
-  std::uint32_t segment = kNoSegment;
-  std::uint32_t cloth = kNoSegment;
-  glm::vec3 tangent{0, 0, 0};
-  glm::vec3 normal{0, 0, 0};
-};
 
 void add_to_layers(LayerSums& sums, const EyeSample& seen, std::uint32_t sample) {
   sums.single += glm::dvec3(seen.single);
@@ -79,87 +58,6 @@ void draw_pixel(const Camera& camera, const Integrator& integrator, const DrawSe
       add_to_layers(*layers, seen, sample);
     }
   }
-}
-
-void store_pixel(Drawing& drawing, const PixelSums& sums, double count, std::size_t i) {
-  const glm::dvec3 mean = sums.radiance / count;
-  // Precomputed multiple scattering may be negative in single samples; a picture is not.
-  drawing.image.pixels[i] = glm::max(glm::vec3(mean), glm::vec3(0));
-  if (count > 1) {
-    for (int c = 0; c < 3; ++c) {
-      const double variance =
-          std::fmax(0.0, sums.squared[c] - sums.radiance[c] * mean[c]) / (count - 1);
-      drawing.standard_error.pixels[i][c] = static_cast<float>(std::sqrt(variance / count));
-    }
-  }
-}
-
-// The mean over the cloth is a ratio, sum of radiance over sum of hits; its error is that of the
-// residual radiance - mean hit, whose variance is taken within each pixel.
-void summarise(Drawing& drawing, const std::vector<PixelSums>& pixels, double count) {
-  glm::dvec3 radiance(0);
-  double hits = 0;
-  for (const PixelSums& sums : pixels) {
-    radiance += sums.cloth_radiance;
-    hits += sums.on_cloth;
-  }
-  drawing.cloth_share = hits / (count * static_cast<double>(pixels.size()));
-  if (!(hits > 0)) {
-    return;
-  }
-  drawing.cloth_mean = radiance / hits;
-  if (!(count > 1)) {
-    return;
-  }
-  glm::dvec3 variance(0);
-  for (const PixelSums& sums : pixels) {
-    const double on_cloth = sums.on_cloth;
-    const glm::dvec3& mean = drawing.cloth_mean;
-    const glm::dvec3 residual = sums.cloth_radiance - mean * on_cloth;
-    const glm::dvec3 squared =
-        sums.cloth_squared - 2.0 * mean * sums.cloth_radiance + mean * mean * on_cloth;
-    variance += (squared - residual * residual / count) * (count / (count - 1));
-  }
-  for (int c = 0; c < 3; ++c) {
-    drawing.cloth_standard_error[c] = std::sqrt(std::fmax(0.0, variance[c])) / hits;
-  }
-}
-
-template <class T, class Value>
-std::vector<T> plane(bool wanted, std::size_t count, const Value& value) {
-  std::vector<T> values;
-  if (wanted) {
-    values.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      values.push_back(value(i));
-    }
-  }
-  return values;
-}
-
-Layers layers_of(LayerSet wanted, const std::vector<LayerSums>& sums,
-                 const std::vector<PixelSums>& pixels, double count) {
-  const std::size_t size = sums.size();
-  const auto mean = [count](const glm::dvec3& sum) {
-    return glm::max(glm::vec3(sum / count), glm::vec3(0));
-  };
-  const bool segment = wanted.has(Layer::kSegment);
-  Layers layers;
-  layers.single = plane<glm::vec3>(wanted.has(Layer::kSingle), size,
-                                   [&](std::size_t i) { return mean(sums[i].single); });
-  layers.multiple = plane<glm::vec3>(wanted.has(Layer::kMultiple), size,
-                                     [&](std::size_t i) { return mean(sums[i].multiple); });
-  layers.shadow = plane<float>(wanted.has(Layer::kShadow), size, [&](std::size_t i) {
-    return pixels[i].on_cloth > 0 ? static_cast<float>(sums[i].shadow / pixels[i].on_cloth) : 0.0f;
-  });
-  layers.segment =
-      plane<std::uint32_t>(segment, size, [&](std::size_t i) { return sums[i].segment; });
-  layers.cloth = plane<std::uint32_t>(segment, size, [&](std::size_t i) { return sums[i].cloth; });
-  layers.tangent = plane<glm::vec3>(wanted.has(Layer::kTangent), size,
-                                    [&](std::size_t i) { return sums[i].tangent; });
-  layers.normal = plane<glm::vec3>(wanted.has(Layer::kNormal), size,
-                                   [&](std::size_t i) { return sums[i].normal; });
-  return layers;
 }
 
 }  // namespace
@@ -229,16 +127,7 @@ void GrowingDrawing::add_samples(const Camera& camera, const Integrator& integra
 }
 
 Drawing GrowingDrawing::drawing() const {
-  CHECK(samples_ > 0);
-  Drawing drawing;
-  drawing.image = Image(settings_.width, settings_.height);
-  drawing.standard_error = Image(settings_.width, settings_.height);
-  for (std::size_t i = 0; i < sums_->pixels.size(); ++i) {
-    store_pixel(drawing, sums_->pixels[i], samples_, i);
-  }
-  drawing.layers = layers_of(settings_.layers, sums_->layers, sums_->pixels, samples_);
-  summarise(drawing, sums_->pixels, samples_);
-  return drawing;
+  return drawing_of(settings_, sums_->pixels, sums_->layers, samples_);
 }
 
 Drawing draw(const Camera& camera, const Integrator& integrator, const DrawSettings& settings,

@@ -33,12 +33,15 @@ class Fabric {
   }
   // Nothing when it was not wanted, or there is none.
   [[nodiscard]] const PrecomputedFabric* precomputed() const { return precomputed_.get(); }
+  // Expires with this object: lets those who keep something made of it know when it is gone.
+  [[nodiscard]] std::weak_ptr<const void> life() const { return life_; }
 
  private:
   fabric::Tile tile_;
   std::vector<shading::FibreBcsdf> bcsdfs_;
   std::unique_ptr<const PrecomputedFabric> precomputed_;
   transport::Scene scene_;  // refers to tile_; a Fabric never moves
+  std::shared_ptr<const void> life_ = std::make_shared<char>();  // shared: watched by life()
 };
 
 // The tile that a database holds, indexed.

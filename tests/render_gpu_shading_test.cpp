@@ -118,23 +118,24 @@ Shaded shade_twice(const Scene& scene, Scattering scattering, std::uint32_t samp
     const int fabric = geometry.cloths[cloth].fabric;
     parts.pieces.push_back({static_cast<int>(cloth), fabric,
                             &tables[static_cast<std::size_t>(fabric)],
-                            scene.cloths[cloth]->constant_rotation().has_value()});
+                            scene.cloths[cloth]->constant_rotation().has_value(),
+                            scene.cloths[cloth]->fabric().precomputed()->settings()});
   }
   parts.lights = device_lights(scene.lights);
   ShadingSettings settings;
   settings.scattering = scattering;
-  settings.shading = scene.cloths.front()->fabric().precomputed()->settings();
-  const ShadingPass pass(device, parts, settings, [] { return false; });
+  ShadingPass pass(device, parts, settings);
+  pass.prepare([] { return false; });
   BatchBuffers buffers(device, pixels * samples, pixels, 36);
   device.fill_zero(buffers.pixels);
-  device.write(buffers.hits, 0, std::as_bytes(std::span(hits)));
+  const Buffer uploaded = device.upload(hits, "hits");
   shading::Batch batch{};
   batch.seed = {static_cast<std::uint32_t>(kSeed), 0};
   batch.width = batch.columns = batch.rows = static_cast<int>(kSide);
   batch.sample_count = static_cast<int>(samples);
   batch.capacity = buffers.capacity;
   std::vector<Dispatch> dispatches;
-  pass.append(batch, buffers, dispatches);
+  pass.append(batch, uploaded, buffers, dispatches);
   device.run(dispatches);
   shaded.device = device.download<shading::DeviceSample>(buffers.samples, hits.size());
   shaded.pixels = device.download<shading::DevicePixel>(buffers.pixels, pixels);

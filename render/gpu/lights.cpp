@@ -2,6 +2,8 @@
 
 #include <variant>
 
+#include "render/environment_fit.h"
+
 namespace weft::render::gpu {
 namespace {
 
@@ -39,10 +41,12 @@ struct Recorder {
     record.edge_a = light.normal;
     record.sharpness = static_cast<float>(light.radius_mm);
   }
-  void operator()(const UniformLight& light) const {
-    (*this)(SgLight{{0, 0, 1}, 1e-3, light.radiance * shading::kFourPi, light.cut_at_horizon});
+  void operator()(const UniformLight& light) const { (*this)(gaussian_of(light)); }
+  void operator()(const EnvironmentLight& light) const {
+    for (const SgLight& gaussian : fit_environment(light, {}).lights) {
+      (*this)(gaussian);
+    }
   }
-  void operator()(const EnvironmentLight& /*light*/) const {}
 };
 
 }  // namespace

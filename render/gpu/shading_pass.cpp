@@ -34,8 +34,8 @@ bool has_one_direction(const shading::DeviceLight& light) {
   return light.kind == shading::kLightDirectional || light.kind == shading::kLightGaussian;
 }
 
-std::uint64_t cell_table_bytes(const DeviceFabricTables& tables) {
-  return std::uint64_t{tables.cells()} * 3 * tables.harmonics() * sizeof(float);
+std::uint64_t table_entries(const DeviceFabricTables& tables) {
+  return std::uint64_t{tables.cells()} * 3 * tables.harmonics();
 }
 
 Dispatch dispatch_of(const Kernel& kernel, std::vector<const Buffer*> buffers,
@@ -56,35 +56,31 @@ ShadingKernels::ShadingKernels(Device& device)
                                   sizeof(ShadingCall))),
       accumulate(device.make_kernel(kernels::accumulate, 3, sizeof(ShadingCall))) {}
 
-std::uint64_t BatchBuffers::bytes_per_item(std::uint32_t harmonics) {
-  return sizeof(shading::DeviceHit) + sizeof(shading::DeviceSample) +
-         std::uint64_t{3} * harmonics * sizeof(float);
+std::uint64_t BatchBuffers::size_bytes(std::uint64_t capacity, std::uint64_t pixels,
+                                       std::uint32_t harmonics) {
+  return capacity * (sizeof(shading::DeviceSample) + std::uint64_t{3} * harmonics * sizeof(float)) +
+         pixels * sizeof(shading::DevicePixel);
 }
 
 BatchBuffers::BatchBuffers(Device& device, std::uint32_t capacity_, std::uint32_t tile_pixels,
                            std::uint32_t harmonics)
     : capacity(capacity_),
-      hits(device.allocate(sizeof(shading::DeviceHit) * std::uint64_t{capacity_}, "hits")),
       samples(device.allocate(sizeof(shading::DeviceSample) * std::uint64_t{capacity_}, "samples")),
       arriving(device.allocate(sizeof(float) * std::uint64_t{3} * harmonics * capacity_,
                                "arriving light")),
       pixels(device.allocate(sizeof(shading::DevicePixel) * std::uint64_t{tile_pixels},
                              "sums of pixels")) {}
 
-std::uint64_t ShadingPass::cell_bytes(const std::vector<ShadedPiece>& pieces,
+std::uint64_t ShadingPass::cell_bytes(std::uint64_t entries,
                                       const std::vector<shading::DeviceLight>& lights) {
   if (!std::all_of(lights.begin(), lights.end(), has_one_direction)) {
     return 0;
   }
-  std::uint64_t bytes = 0;
-  for (const ShadedPiece& piece : pieces) {
-    bytes += piece.turned_alike ? cell_table_bytes(*piece.tables) * lights.size() : 0;
-  }
+  const std::uint64_t bytes = entries * lights.size() * sizeof(float);
   return bytes <= kMostCellBytes ? bytes : 0;
 }
 
-ShadingPass::ShadingPass(Device& device, Parts parts, const ShadingSettings& settings,
-                         const std::function<bool()>& should_stop)
+ShadingPass::ShadingPass(Device& device, Parts parts, const ShadingSettings& settings)
     : device_(device),
       parts_(std::move(parts)),
       settings_(settings),
@@ -95,17 +91,20 @@ ShadingPass::ShadingPass(Device& device, Parts parts, const ShadingSettings& set
     parts_.lights.back().place = {0, 0, 1};
   }
   lights_ = device.upload(parts_.lights, "lights");
-  const bool transferred = cell_bytes(parts_.pieces, parts_.lights) > 0 &&
-                           settings.scattering != Scattering::kSingleOnly;
+  std::uint64_t entries = 0;
+  for (const ShadedPiece& piece : parts_.pieces) {
+    entries += piece.turned_alike ? table_entries(*piece.tables) : 0;
+  }
+  const bool transferred =
+      cell_bytes(entries, parts_.lights) > 0 && settings.scattering != Scattering::kSingleOnly;
   for (const ShadedPiece& shaded : parts_.pieces) {
     Piece piece{shaded, transferred && shaded.turned_alike, {}};
     for (std::size_t light = 0; piece.transferred && light < parts_.lights.size(); ++light) {
-      piece.cells.push_back(
-          device.allocate(cell_table_bytes(*shaded.tables), "light behind its transfer"));
+      piece.cells.push_back(device.allocate(table_entries(*shaded.tables) * sizeof(float),
+                                            "light behind its transfer"));
     }
     pieces_.push_back(std::move(piece));
   }
-  transfer_to_cells(should_stop);
 }
 
 ShadingCall ShadingPass::call_of(const Piece& piece) const {
@@ -117,9 +116,9 @@ ShadingCall ShadingPass::call_of(const Piece& piece) const {
   call.wanted = (settings_.scattering == Scattering::kMultipleOnly ? 0 : shading::kWantSingle) |
                 (settings_.scattering == Scattering::kSingleOnly ? 0 : shading::kWantMultiple) |
                 (settings_.wants_shadow ? shading::kWantShadow : 0);
-  call.blend_low = settings_.shading.blend_low;
-  call.blend_high = settings_.shading.blend_high;
-  call.gamma_method = settings_.shading.gamma_method;
+  call.blend_low = piece.shaded.shading.blend_low;
+  call.blend_high = piece.shaded.shading.blend_high;
+  call.gamma_method = piece.shaded.shading.gamma_method;
   return call;
 }
 
@@ -130,45 +129,54 @@ std::vector<const Buffer*> ShadingPass::solid_and(const Piece& piece) const {
   return buffers;
 }
 
-void ShadingPass::transfer_to_cells(const std::function<bool()>& should_stop) {
+void ShadingPass::prepare(const std::function<bool()>& should_stop) {
+  if (is_prepared_) {
+    return;
+  }
   for (const Piece& piece : pieces_) {
     for (std::size_t light = 0; light < piece.cells.size(); ++light) {
-      ShadingCall call = call_of(piece);
-      call.light = static_cast<int>(light);
-      for (const DeviceFabricTables::Page& page : piece.shaded.tables->pages()) {
-        std::vector<const Buffer*> buffers = solid_and(piece);
-        buffers.insert(buffers.end(), {&page.transfer, &lights_, &piece.cells[light]});
-        for (std::uint32_t done = 0; done < page.cells; done += kCellsAtOnce) {
-          if (should_stop()) {
-            throw core::Error(core::Code::kCancelled, "the picture was cancelled");
-          }
-          call.first_cell = static_cast<int>(page.first_cell);
-          call.first_of_page = static_cast<int>(done);
-          call.cells = static_cast<int>(std::min(kCellsAtOnce, page.cells - done));
-          const Dispatch dispatch = dispatch_of(parts_.kernels->light_cells, buffers, call,
-                                                3 * static_cast<std::uint32_t>(call.cells));
-          device_.run({&dispatch, 1});
-        }
+      transfer_to_cells(piece, static_cast<int>(light), should_stop);
+    }
+  }
+  is_prepared_ = true;
+}
+
+void ShadingPass::transfer_to_cells(const Piece& piece, int light,
+                                    const std::function<bool()>& should_stop) {
+  ShadingCall call = call_of(piece);
+  call.light = light;
+  for (const DeviceFabricTables::Page& page : piece.shaded.tables->pages()) {
+    std::vector<const Buffer*> buffers = solid_and(piece);
+    buffers.insert(buffers.end(),
+                   {&page.transfer, &lights_, &piece.cells[static_cast<std::size_t>(light)]});
+    call.first_cell = static_cast<int>(page.first_cell);
+    for (std::uint32_t done = 0; done < page.cells; done += kCellsAtOnce) {
+      if (should_stop()) {
+        throw core::Error(core::Code::kCancelled, "the picture was cancelled");
       }
+      const std::uint32_t cells = std::min(kCellsAtOnce, page.cells - done);
+      call.first_of_page = static_cast<int>(done);
+      call.cells = static_cast<int>(cells);
+      const Dispatch dispatch = dispatch_of(parts_.kernels->light_cells, buffers, call, 3 * cells);
+      device_.run({&dispatch, 1});
     }
   }
 }
 
-void ShadingPass::append_light(const ShadingCall& call, const Piece& piece,
-                               const BatchBuffers& buffers,
-                               std::vector<Dispatch>& dispatches) const {
+Dispatch ShadingPass::light_dispatch(const ShadingCall& call, const Piece& piece,
+                                     const Buffer& hits, const BatchBuffers& buffers) const {
   const auto light = static_cast<std::size_t>(call.light);
   std::vector<const Buffer*> bound = solid_and(piece);
-  bound.insert(bound.end(), {&buffers.hits, &lights_, &buffers.samples, &buffers.arriving,
+  bound.insert(bound.end(), {&hits, &lights_, &buffers.samples, &buffers.arriving,
                              piece.transferred ? &piece.cells[light] : &no_cells_});
   const bool gaussian = parts_.lights[light].kind == shading::kLightGaussian;
-  dispatches.push_back(
-      dispatch_of(gaussian ? parts_.kernels->light_gaussian : parts_.kernels->light_drawn,
-                  std::move(bound), call, shading::batch_items(call.batch)));
+  return dispatch_of(gaussian ? parts_.kernels->light_gaussian : parts_.kernels->light_drawn,
+                     std::move(bound), call, shading::batch_items(call.batch));
 }
 
-void ShadingPass::append(const Batch& batch, const BatchBuffers& buffers,
+void ShadingPass::append(const Batch& batch, const Buffer& hits, const BatchBuffers& buffers,
                          std::vector<Dispatch>& dispatches) const {
+  CHECK(is_prepared_);
   CHECK_LE(shading::batch_items(batch), buffers.capacity);
   ShadingCall call{};
   for (const Piece& piece : pieces_) {
@@ -177,7 +185,7 @@ void ShadingPass::append(const Batch& batch, const BatchBuffers& buffers,
     for (std::size_t light = 0; light < parts_.lights.size(); ++light) {
       call.light = static_cast<int>(light);
       call.is_first = light == 0 ? 1 : 0;
-      append_light(call, piece, buffers, dispatches);
+      dispatches.push_back(light_dispatch(call, piece, hits, buffers));
     }
     if (settings_.scattering == Scattering::kSingleOnly) {
       continue;
@@ -186,15 +194,14 @@ void ShadingPass::append(const Batch& batch, const BatchBuffers& buffers,
       call.first_cell = static_cast<int>(page.first_cell);
       call.cells = static_cast<int>(page.cells);
       std::vector<const Buffer*> bound = solid_and(piece);
-      bound.insert(bound.end(),
-                   {&page.transfer, &buffers.hits, &buffers.samples, &buffers.arriving});
+      bound.insert(bound.end(), {&page.transfer, &hits, &buffers.samples, &buffers.arriving});
       dispatches.push_back(dispatch_of(parts_.kernels->multiple, std::move(bound), call,
                                        shading::batch_items(batch)));
     }
   }
   call.batch = batch;
   dispatches.push_back(dispatch_of(parts_.kernels->accumulate,
-                                   {&buffers.hits, &buffers.samples, &buffers.pixels}, call,
+                                   {&hits, &buffers.samples, &buffers.pixels}, call,
                                    static_cast<std::uint32_t>(batch.columns * batch.rows)));
 }
 

@@ -23,15 +23,16 @@ struct ShadingKernels {
   Kernel accumulate;
 };
 
-// What belongs to the items of a batch, and the sums over the samples of a band's pixels.
+// What belongs to the items of a batch besides their hits, and the sums over the samples of a
+// band's pixels.
 struct BatchBuffers {
   // `capacity` items, `pixels` pixels, fabrics of up to `harmonics` coefficients.
   BatchBuffers(Device& device, std::uint32_t capacity, std::uint32_t pixels,
                std::uint32_t harmonics);
-  [[nodiscard]] static std::uint64_t bytes_per_item(std::uint32_t harmonics);
+  [[nodiscard]] static std::uint64_t size_bytes(std::uint64_t capacity, std::uint64_t pixels,
+                                                std::uint32_t harmonics);
 
   std::uint32_t capacity;
-  Buffer hits;
   Buffer samples;
   Buffer arriving;
   Buffer pixels;
@@ -43,11 +44,11 @@ struct ShadedPiece {
   int fabric = 0;  // its number in DeviceHit
   const DeviceFabricTables* tables = nullptr;
   bool turned_alike = false;  // directions are turned into the flat fabric by one rotation
+  PrecomputedSettings shading;
 };
 
 struct ShadingSettings {
   Scattering scattering = Scattering::kAll;
-  PrecomputedSettings shading;
   bool wants_shadow = false;
 };
 
@@ -66,18 +67,21 @@ class ShadingPass {
   };
   // Transfers whose tables would together take more than this are done per hit.
   static constexpr std::uint64_t kMostCellBytes = std::uint64_t{512} << 20;
-  // The bytes of the tables that it would make.
-  [[nodiscard]] static std::uint64_t cell_bytes(const std::vector<ShadedPiece>& pieces,
+  // The bytes of the tables that it will make. `entries`: coefficients of all cells and channels,
+  // over the pieces that are turned alike.
+  [[nodiscard]] static std::uint64_t cell_bytes(std::uint64_t entries,
                                                 const std::vector<shading::DeviceLight>& lights);
 
-  // Uploads the lights and transfers them to the cells, in submissions of bounded work. Calls
-  // `should_stop` between them and throws core::Error(kCancelled) when it says so. What `parts`
-  // points to must outlive the pass.
-  ShadingPass(Device& device, Parts parts, const ShadingSettings& settings,
-              const std::function<bool()>& should_stop);
+  // Uploads the lights. What `parts` points to must outlive the pass.
+  ShadingPass(Device& device, Parts parts, const ShadingSettings& settings);
+
+  // Transfers the lights to the cells, in submissions of bounded work; once, before the first
+  // batch. Calls `should_stop` between them and throws core::Error(kCancelled) when it says so.
+  void prepare(const std::function<bool()>& should_stop);
 
   // Appends what shades the hits of a batch and adds them to the sums of their pixels.
-  void append(const shading::Batch& batch, const BatchBuffers& buffers,
+  // `hits`: a DeviceHit for each item.
+  void append(const shading::Batch& batch, const Buffer& hits, const BatchBuffers& buffers,
               std::vector<Dispatch>& dispatches) const;
 
  private:
@@ -86,9 +90,9 @@ class ShadingPass {
     bool transferred = false;
     std::vector<Buffer> cells;  // by light, when transferred
   };
-  void transfer_to_cells(const std::function<bool()>& should_stop);
-  void append_light(const shading::ShadingCall& call, const Piece& piece,
-                    const BatchBuffers& buffers, std::vector<Dispatch>& dispatches) const;
+  void transfer_to_cells(const Piece& piece, int light, const std::function<bool()>& should_stop);
+  [[nodiscard]] Dispatch light_dispatch(const shading::ShadingCall& call, const Piece& piece,
+                                        const Buffer& hits, const BatchBuffers& buffers) const;
   [[nodiscard]] shading::ShadingCall call_of(const Piece& piece) const;
   [[nodiscard]] std::vector<const Buffer*> solid_and(const Piece& piece) const;
 
@@ -98,6 +102,7 @@ class ShadingPass {
   Buffer lights_;
   Buffer no_cells_;
   std::vector<Piece> pieces_;
+  bool is_prepared_ = false;
 };
 
 }  // namespace weft::render::gpu
