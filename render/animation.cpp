@@ -197,6 +197,7 @@ std::vector<std::string> files_of(const v1::Scene& scene) {
     files.insert(key.value().environment().exr_file());
   }
   for (const v1::Cloth& cloth : scene.cloths()) {
+    files.insert(cloth.pattern().png_file());
     for (const std::uint32_t frame : frame_numbers(scene)) {
       files.insert(scene.has_animation() ? with_frame_number(cloth.shell().obj_file(), frame)
                                          : cloth.shell().obj_file());

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "render/flat_cloth.h"
 #include "render/image.h"
+#include "render/read_pattern.h"
 #include "render/scene_description.h"
 #include "render/shell_cloth.h"
 #include "render/sphere_sampling.h"
@@ -82,27 +83,44 @@ double default_tiles(const fabric::Tile& tile, fabric::Role role, double tile_mm
                      : std::ceil(kDefaultSwatchMm / tile_mm);
 }
 
-std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric) {
+// One fabric, or the several of a pattern.
+ClothFabric fabrics_of(const v1::Cloth& cloth, const FabricSource& fabrics,
+                       const FileSource& files) {
+  if (!cloth.has_pattern()) {
+    return ClothFabric(fabrics(cloth.fabric()));
+  }
+  BlockPattern pattern = pattern_of(cloth.pattern(), files);
+  std::vector<std::shared_ptr<const Fabric>> several;  // shared: as FabricSource gives them
+  for (const std::string& name : cloth.pattern().fabrics()) {
+    several.push_back(fabrics(name));
+  }
+  return {std::move(several), std::move(pattern)};
+}
+
+std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics) {
   const v1::FlatSwatch& flat = cloth.flat();
-  const fabric::Tile& tile = fabric->tile();
-  const glm::dvec2 tile_mm(tile.size_mm);
-  const auto size_of = [&](double size_mm, double tiles, fabric::Role role, double one_mm) {
-    if (size_mm > 0) {
-      return size_mm;
-    }
-    return one_mm * (tiles > 0 ? tiles : default_tiles(tile, role, one_mm));
+  const fabric::Tile& tile = fabrics.fabrics().front()->tile();
+  glm::dvec2 one_mm(tile.size_mm);
+  glm::dvec2 count(default_tiles(tile, fabric::Role::kWarp, one_mm.x),
+                   default_tiles(tile, fabric::Role::kWeft, one_mm.y));
+  if (const BlockPattern* pattern = fabrics.pattern()) {
+    one_mm = pattern->block_mm * glm::dvec2(pattern->width, pattern->height);
+    count = {1, 1};
+  }
+  const auto size_of = [](double size_mm, double tiles, double otherwise, double tile_mm) {
+    return size_mm > 0 ? size_mm : tile_mm * (tiles > 0 ? tiles : otherwise);
   };
   FlatPlacement placement;
-  placement.size_mm = {size_of(flat.size_x_mm(), flat.tiles_x(), fabric::Role::kWarp, tile_mm.x),
-                       size_of(flat.size_y_mm(), flat.tiles_y(), fabric::Role::kWeft, tile_mm.y)};
+  placement.size_mm = {size_of(flat.size_x_mm(), flat.tiles_x(), count.x, one_mm.x),
+                       size_of(flat.size_y_mm(), flat.tiles_y(), count.y, one_mm.y)};
   placement.endless = flat.endless();
   placement.turn = flat.turn_deg() * kPi / 180;
   placement.centre_mm = {flat.centre_x_mm(), flat.centre_y_mm(), flat.centre_z_mm()};
   placement.black_underlay = cloth.black_underlay();
-  return make_flat_cloth(std::move(fabric), placement);
+  return make_flat_cloth(std::move(fabrics), placement);
 }
 
-std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, std::shared_ptr<const Fabric> fabric,
+std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics,
                                       const FileSource& files, std::vector<std::string>& remarks) {
   const v1::ShellMesh& shell = cloth.shell();
   ObjMesh mesh = read_obj_text(files(shell.obj_file()), shell.obj_file());
@@ -116,7 +134,7 @@ std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, std::shared_ptr<co
   placement.thickness_mm = shell.thickness_mm();
   placement.flip_normals = shell.flip_normals();
   placement.black_underlay = cloth.black_underlay();
-  return make_shell_cloth(std::move(fabric), mesh, placement, remarks);
+  return make_shell_cloth(std::move(fabrics), mesh, placement, remarks);
 }
 
 Cloth::Bounds bounds_of(const std::vector<std::unique_ptr<Cloth>>& cloths) {
@@ -199,10 +217,10 @@ Scene build_scene(const v1::Scene& description, const FabricSource& fabrics,
     scene.lights.push_back(light_of(light, whole.cut_lights_at_horizon(), files));
   }
   for (const v1::Cloth& cloth : whole.cloths()) {
-    std::shared_ptr<const Fabric> fabric = fabrics(cloth.fabric());
+    ClothFabric of = fabrics_of(cloth, fabrics, files);
     scene.cloths.push_back(cloth.has_shell()
-                               ? shell_cloth_of(cloth, std::move(fabric), files, scene.remarks)
-                               : flat_cloth_of(cloth, std::move(fabric)));
+                               ? shell_cloth_of(cloth, std::move(of), files, scene.remarks)
+                               : flat_cloth_of(cloth, std::move(of)));
   }
   scene.camera = camera_of(whole, bounds_of(scene.cloths));
   scene.background = colour_or(true, whole.picture().background(), 0);

@@ -7,6 +7,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "render/cloth_fabric.h"
 #include "render/cloth_form.h"
 #include "render/fabric.h"
 #include "render/ray.h"
@@ -19,6 +20,7 @@ struct FibreHit {
   double t_mm = 0;             // along the ray, in the world
   std::uint32_t segment = 0;   // of the fabric's tile
   transport::StrandCopy copy;  // the strand, relative to tile (0, 0) of the flat fabric
+  std::uint32_t fabric = 0;    // of the piece's: patterned cloth has several
   std::uint32_t place = 0;     // the piece's own mark of where it is (a shell: the tetrahedron)
   glm::dvec3 world_mm{0, 0, 0};
   glm::dvec3 flat_mm{0, 0, 0};  // the same point of the flat, endless fabric
@@ -65,7 +67,14 @@ class Cloth {
   Cloth& operator=(Cloth&&) = delete;
   virtual ~Cloth() = default;
 
-  [[nodiscard]] virtual const Fabric& fabric() const = 0;
+  // What the piece is of.
+  [[nodiscard]] virtual const ClothFabric& fabrics() const = 0;
+  // The fabric that was met.
+  [[nodiscard]] const Fabric& fabric(const FibreHit& hit) const {
+    return *fabrics().fabrics()[hit.fabric];
+  }
+  // The only fabric; the first of several.
+  [[nodiscard]] const Fabric& fabric() const { return *fabrics().fabrics().front(); }
 
   // The first fibre (or black sheet) that the ray enters before t_max_mm. `from`, when given, is
   // the hit on this piece at which the ray starts; its fibre is not met again.
@@ -97,17 +106,6 @@ class Cloth {
   };
   [[nodiscard]] virtual Bounds bounds() const = 0;
 };
-
-// The first fibre that a piece of a straight line in flat, endless fabric enters: from `start_mm`
-// along `way_mm` (not unit: its length is the piece's). `ignored` is relative to tile (0, 0).
-struct FlatHit {
-  double share = 0;  // of the way
-  std::uint32_t segment = 0;
-  transport::StrandCopy copy;  // relative to tile (0, 0)
-};
-[[nodiscard]] std::optional<FlatHit> closest_in_flat(
-    const transport::Scene& scene, const glm::dvec3& start_mm, const glm::dvec3& way_mm,
-    const std::optional<transport::StrandCopy>& ignored);
 
 // Unit tangent of segment k.
 [[nodiscard]] glm::vec3 tangent_of(const fabric::Tile& tile, std::uint32_t k);

@@ -26,18 +26,24 @@ struct Passage {
 
 class FlatCloth : public Cloth {
  public:
-  FlatCloth(std::shared_ptr<const Fabric> fabric, const FlatPlacement& placement)
-      : fabric_(std::move(fabric)), placement_(placement) {
+  FlatCloth(ClothFabric fabrics, const FlatPlacement& placement)
+      : fabrics_(std::move(fabrics)), placement_(placement), origin_mm_(placement.centre_mm) {
     const double c = std::cos(placement.turn);
     const double s = std::sin(placement.turn);
     // Columns: the images of the world's axes under the turn back.
     to_flat_ = glm::dmat3(glm::dvec3(c, -s, 0), glm::dvec3(s, c, 0), glm::dvec3(0, 0, 1));
     const glm::dvec2 half = placement.endless ? glm::dvec2(kInfinity) : 0.5 * placement.size_mm;
-    low_ = glm::dvec3(-half, fabric_->tile().z_min_mm);
-    high_ = glm::dvec3(half, fabric_->tile().z_max_mm);
+    low_ = glm::dvec3(-half, fabrics_.low_mm());
+    high_ = glm::dvec3(half, fabrics_.high_mm());
+    if (fabrics_.pattern() != nullptr) {
+      const glm::dvec3 to_corner(0.5 * placement.size_mm, 0);
+      origin_mm_ -= glm::transpose(to_flat_) * to_corner;
+      low_ += to_corner;
+      high_ += to_corner;
+    }
   }
 
-  [[nodiscard]] const Fabric& fabric() const override { return *fabric_; }
+  [[nodiscard]] const ClothFabric& fabrics() const override { return fabrics_; }
 
   [[nodiscard]] Meeting closest(const Ray& ray, double t_max_mm,
                                 const FibreHit* from) const override {
@@ -93,7 +99,7 @@ class FlatCloth : public Cloth {
     if (flat.x < low_.x || flat.x > high_.x || flat.y < low_.y || flat.y > high_.y) {
       return std::nullopt;
     }
-    return glm::transpose(to_flat_) * flat + placement_.centre_mm;
+    return glm::transpose(to_flat_) * flat + origin_mm_;
   }
 
   [[nodiscard]] std::optional<glm::mat3> constant_rotation() const override {
@@ -101,7 +107,7 @@ class FlatCloth : public Cloth {
   }
 
   [[nodiscard]] ClothForm form() const override {
-    return {placement_.black_underlay, FlatForm{to_flat_, placement_.centre_mm, low_, high_}};
+    return {placement_.black_underlay, FlatForm{to_flat_, origin_mm_, low_, high_}};
   }
 
   [[nodiscard]] Bounds bounds() const override {
@@ -115,7 +121,7 @@ class FlatCloth : public Cloth {
 
  private:
   [[nodiscard]] Ray flat_ray(const Ray& ray) const {
-    return {to_flat_ * (ray.origin_mm - placement_.centre_mm), to_flat_ * ray.direction};
+    return {to_flat_ * (ray.origin_mm - origin_mm_), to_flat_ * ray.direction};
   }
 
   // The highest fibres touch the surface: a ray that began on it might begin inside them.
@@ -163,12 +169,12 @@ class FlatCloth : public Cloth {
     if (!(end > start)) {
       return std::nullopt;
     }
-    std::optional<transport::StrandCopy> ignored;
+    std::optional<FlatStart> own;
     if (from != nullptr) {
-      ignored = from->copy;
+      own = FlatStart{from->copy, from->fabric};
     }
     const std::optional<FlatHit> found =
-        closest_in_flat(fabric_->scene(), flat.at(start), (end - start) * flat.direction, ignored);
+        fabrics_.closest(flat.at(start), (end - start) * flat.direction, own);
     if (!found) {
       return std::nullopt;
     }
@@ -176,15 +182,17 @@ class FlatCloth : public Cloth {
     hit.t_mm = start + found->share * (end - start);
     hit.segment = found->segment;
     hit.copy = found->copy;
+    hit.fabric = found->fabric;
     hit.world_mm = ray.at(hit.t_mm);
     hit.flat_mm = flat.at(hit.t_mm);
     hit.to_flat = glm::mat3(to_flat_);
-    hit.tangent = tangent_of(fabric_->tile(), hit.segment);
+    hit.tangent = tangent_of(fabric(hit).tile(), hit.segment);
     return hit;
   }
 
-  std::shared_ptr<const Fabric> fabric_;  // shared: several pieces may be of one fabric
+  ClothFabric fabrics_;
   FlatPlacement placement_;
+  glm::dvec3 origin_mm_;  // of the flat fabric, in the world
   glm::dmat3 to_flat_{1};
   glm::dvec3 low_{0, 0, 0};  // the box of the cloth in the flat fabric
   glm::dvec3 high_{0, 0, 0};
@@ -192,11 +200,14 @@ class FlatCloth : public Cloth {
 
 }  // namespace
 
+std::unique_ptr<Cloth> make_flat_cloth(ClothFabric fabrics, const FlatPlacement& placement) {
+  CHECK(placement.size_mm.x > 0 && placement.size_mm.y > 0);
+  return std::make_unique<FlatCloth>(std::move(fabrics), placement);
+}
+
 std::unique_ptr<Cloth> make_flat_cloth(std::shared_ptr<const Fabric> fabric,
                                        const FlatPlacement& placement) {
-  CHECK(fabric != nullptr);
-  CHECK(placement.size_mm.x > 0 && placement.size_mm.y > 0);
-  return std::make_unique<FlatCloth>(std::move(fabric), placement);
+  return make_flat_cloth(ClothFabric(std::move(fabric)), placement);
 }
 
 }  // namespace weft::render

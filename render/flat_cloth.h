@@ -14,8 +14,13 @@ struct FlatPlacement {
   bool black_underlay = false;
 };
 
-// A flat rectangle of cloth, level, its upper side up. `fabric` is shared by the pieces of one
-// scene.
+// A flat rectangle of cloth, level, its upper side up. The origin of the flat fabric is at its
+// centre; in patterned cloth at its corner of least x and y, so that a rectangle of whole patterns
+// shows them whole.
+[[nodiscard]] std::unique_ptr<Cloth> make_flat_cloth(ClothFabric fabrics,
+                                                     const FlatPlacement& placement);
+
+// The same of one fabric, which is shared by the pieces of one scene.
 [[nodiscard]] std::unique_ptr<Cloth> make_flat_cloth(std::shared_ptr<const Fabric> fabric,
                                                      const FlatPlacement& placement);
 

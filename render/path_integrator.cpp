@@ -48,7 +48,8 @@ PathIntegrator::Vertex PathIntegrator::vertex_at(const SceneHit& hit,
   const glm::vec3 omega_o = hit.fibre.to_flat * glm::vec3(towards_eye);
   Vertex vertex;
   vertex.hit = hit;
-  vertex.bcsdf = &scene_.cloths[hit.cloth]->fabric().bcsdf_of_strand(hit.fibre.copy.strand);
+  vertex.bcsdf =
+      &scene_.cloths[hit.cloth]->fabric(hit.fibre).bcsdf_of_strand(hit.fibre.copy.strand);
   vertex.to_fibre = shading::fibre_frame(hit.fibre.tangent, omega_o) * hit.fibre.to_flat;
   vertex.omega_o = vertex.to_fibre * glm::vec3(towards_eye);
   return vertex;

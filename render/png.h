@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "render/image.h"
@@ -14,6 +16,20 @@ namespace weft::render {
 // core::Error(kUnavailable) when the file cannot be written.
 void write_png(const std::filesystem::path& path, std::uint32_t width, std::uint32_t height,
                std::span<const std::uint8_t> rgb);
+
+// A picture of numbers: of the colours in a palette, or grey levels as they are stored.
+struct PlainPicture {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  bool has_palette = false;
+  std::vector<std::uint8_t> values;  // [height, width], top row first
+};
+
+// Decodes a PNG with a palette, or a grey one of at most 8 bits. Throws core::Error: kDataLoss when
+// it is damaged or no PNG, kInvalidArgument when it has colours without a palette, more bits, or a
+// side beyond `side_limit`; `name` stands for it in messages.
+[[nodiscard]] PlainPicture read_plain_png(std::string_view bytes, const std::string& name,
+                                          std::uint32_t side_limit);
 
 // The picture as a screen shows it: times 2^exposure_stops, values above 0.8 rolled off smoothly
 // towards 1, encoded as sRGB. NaN becomes black.

@@ -50,30 +50,40 @@ struct PrecomputedIntegrator::Scattered {
 PrecomputedIntegrator::PrecomputedIntegrator(const Scene& scene, Scattering scattering,
                                              bool wants_shadow, const TermSources& sources)
     : scene_(scene), scattering_(scattering), wants_shadow_(wants_shadow), sources_(sources) {
+  std::size_t fabrics = 0;
   for (const auto& cloth : scene.cloths) {
-    const PrecomputedFabric* fabric = cloth->fabric().precomputed();
-    CHECK(fabric != nullptr);
-    if (sources.single != TermSource::kDatabase || sources.multiple != TermSource::kDatabase) {
-      traced_.emplace_back(cloth->fabric());
-    }
-    const std::optional<glm::mat3> rotation = cloth->constant_rotation();
-    for (const Light& light : scene.lights) {
-      std::optional<CellRadiance> radiance;
-      const auto* directional = std::get_if<DirectionalLight>(&light);
-      const auto* sg = std::get_if<SgLight>(&light);
-      if (rotation && directional != nullptr) {
-        radiance = fabric->light_cells(
-            harmonics_of_directional(glm::normalize(*rotation * glm::vec3(directional->towards))));
-      } else if (rotation && sg != nullptr) {
-        radiance = fabric->light_cells(harmonics_of_sg(gaussian_in(*rotation, *sg)));
+    first_fabric_.push_back(fabrics);
+    fabrics += cloth->fabrics().fabrics().size();
+    for (const auto& fabric : cloth->fabrics().fabrics()) {
+      if (sources.single != TermSource::kDatabase || sources.multiple != TermSource::kDatabase) {
+        traced_.emplace_back(*fabric);
       }
-      cells_.push_back(std::move(radiance));
+      add_cells(*fabric, cloth->constant_rotation());
     }
   }
 }
 
-const CellRadiance* PrecomputedIntegrator::cells(std::size_t cloth, std::size_t light) const {
-  const std::optional<CellRadiance>& radiance = cells_[cloth * scene_.lights.size() + light];
+void PrecomputedIntegrator::add_cells(const Fabric& fabric,
+                                      const std::optional<glm::mat3>& rotation) {
+  const PrecomputedFabric* precomputed = fabric.precomputed();
+  CHECK(precomputed != nullptr);
+  for (const Light& light : scene_.lights) {
+    std::optional<CellRadiance> radiance;
+    const auto* directional = std::get_if<DirectionalLight>(&light);
+    const auto* sg = std::get_if<SgLight>(&light);
+    if (rotation && directional != nullptr) {
+      radiance = precomputed->light_cells(
+          harmonics_of_directional(glm::normalize(*rotation * glm::vec3(directional->towards))));
+    } else if (rotation && sg != nullptr) {
+      radiance = precomputed->light_cells(harmonics_of_sg(gaussian_in(*rotation, *sg)));
+    }
+    cells_.push_back(std::move(radiance));
+  }
+}
+
+const CellRadiance* PrecomputedIntegrator::cells(const SceneHit& hit, std::size_t light) const {
+  const std::optional<CellRadiance>& radiance =
+      cells_[fabric_index(hit) * scene_.lights.size() + light];
   return radiance ? &*radiance : nullptr;
 }
 
@@ -104,7 +114,7 @@ glm::dvec3 PrecomputedIntegrator::neighbour(const Shaded& at, core::Random& rand
 
 glm::vec3 PrecomputedIntegrator::multiple(const Shaded& at, std::size_t light,
                                           const shading::ShVector& harmonics) const {
-  const CellRadiance* radiance = cells(at.hit.cloth, light);
+  const CellRadiance* radiance = cells(at.hit, light);
   return radiance != nullptr ? at.fabric.multiple(at.point, *radiance)
                              : at.fabric.multiple(at.point, harmonics);
 }
@@ -222,7 +232,7 @@ PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_traced(const Shaded
   if (sample.distance_mm < kInfinity) {
     arrival.point_mm = at.hit.fibre.world_mm + sample.distance_mm * sample.direction;
   }
-  const TracedTerms& traced = traced_[at.hit.cloth];
+  const TracedTerms& traced = traced_[fabric_index(at.hit)];
   const glm::vec3 weight = sample.radiance / static_cast<float>(sample.pdf);
   Scattered sum;
   if (single_wanted(scattering_) && reaches(at.top_mm, arrival)) {
@@ -269,7 +279,7 @@ EyeSample PrecomputedIntegrator::trace(const Ray& ray, core::Random& random) con
   }
   const FibreHit& fibre = first.hit.fibre;
   const Cloth& cloth = *scene_.cloths[first.hit.cloth];
-  const PrecomputedFabric& fabric = *cloth.fabric().precomputed();
+  const PrecomputedFabric& fabric = *cloth.fabric(fibre).precomputed();
   const glm::vec3 omega_o = glm::normalize(fibre.to_flat * glm::vec3(-ray.direction));
   const Shaded at{first.hit, cloth, fabric, fabric.point(fibre.segment, fibre.tangent, omega_o),
                   cloth.top_point(fibre, glm::dvec2(0)).value_or(fibre.world_mm)};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -45,15 +46,21 @@ class PrecomputedIntegrator : public Integrator {
   [[nodiscard]] glm::dvec3 neighbour(const Shaded& at, core::Random& random) const;
   [[nodiscard]] glm::vec3 multiple(const Shaded& at, std::size_t light,
                                    const shading::ShVector& harmonics) const;
-  [[nodiscard]] const CellRadiance* cells(std::size_t cloth, std::size_t light) const;
+  // Among the fabrics of all pieces.
+  [[nodiscard]] std::size_t fabric_index(const SceneHit& hit) const {
+    return first_fabric_[hit.cloth] + hit.fibre.fabric;
+  }
+  void add_cells(const Fabric& fabric, const std::optional<glm::mat3>& rotation);
+  [[nodiscard]] const CellRadiance* cells(const SceneHit& hit, std::size_t light) const;
 
   const Scene& scene_;
   Scattering scattering_;
   bool wants_shadow_;
   TermSources sources_;
-  std::vector<TracedTerms> traced_;  // by cloth; empty when everything is looked up
-  // [cloths, lights]: after the transfer, where the light's direction in the flat fabric is the
-  // same everywhere.
+  std::vector<std::size_t> first_fabric_;  // of each piece of cloth, among those of all pieces
+  std::vector<TracedTerms> traced_;        // by fabric; empty when everything is looked up
+  // [fabrics of all pieces, lights]: after the transfer, where the light's direction in the flat
+  // fabric is the same everywhere.
   std::vector<std::optional<CellRadiance>> cells_;
 };
 

@@ -4,9 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "render/animation.h"
 #include "render/environment_fit.h"
 #include "render/image.h"
+#include "render/read_pattern.h"
 
 namespace weft::render {
 namespace {
@@ -187,7 +189,28 @@ class Checker {
     }
   }
 
+  void check_pattern(const v1::Pattern& pattern, const std::string& path) {
+    require(pattern.fabrics_size() >= 1 && pattern.fabrics_size() <= kMostPatternFabrics,
+            path + ".fabrics",
+            "give from 1 to " + std::to_string(kMostPatternFabrics) + " fabrics");
+    if (pattern.has_rows()) {
+      try {
+        static_cast<void>(pattern_of(pattern));
+      } catch (const core::Error& error) {
+        mistakes_.push_back({path + ".rows", error.what()});
+      }
+    } else {
+      require(!pattern.png_file().empty(), path,
+              "no matrix; give rows { row: \"01\" row: \"10\" } or png_file: \"...\"");
+    }
+  }
+
   void check_cloth(const v1::Cloth& cloth, const std::string& path) {
+    if (cloth.has_pattern()) {
+      require(cloth.fabric().empty(), path + ".fabric",
+              "given beside a pattern; name the fabrics in pattern.fabrics alone");
+      check_pattern(cloth.pattern(), path + ".pattern");
+    }
     if (cloth.has_flat()) {
       const v1::FlatSwatch& flat = cloth.flat();
       const std::string here = path + ".flat";

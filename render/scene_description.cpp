@@ -67,6 +67,9 @@ v1::Scene parse_scene(std::string_view text, const std::string& name,
     if (cloth.has_shell()) {
       relative_to(folder, *cloth.mutable_shell()->mutable_obj_file());
     }
+    if (cloth.pattern().has_png_file()) {
+      relative_to(folder, *cloth.mutable_pattern()->mutable_png_file());
+    }
   }
   return scene;
 }
@@ -93,7 +96,11 @@ void complete_scene(v1::Scene& scene, const std::string& fabric) {
     *scene.mutable_cloths() = otherwise.cloths();
   }
   for (v1::Cloth& cloth : *scene.mutable_cloths()) {
-    if (cloth.fabric().empty()) {
+    if (cloth.has_pattern()) {
+      for (std::string& name : *cloth.mutable_pattern()->mutable_fabrics()) {
+        name = name.empty() ? fabric : name;
+      }
+    } else if (cloth.fabric().empty()) {
       cloth.set_fabric(fabric);
     }
   }

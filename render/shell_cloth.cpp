@@ -33,9 +33,8 @@ struct Stay {
 
 class ShellCloth : public Cloth {
  public:
-  ShellCloth(std::shared_ptr<const Fabric> fabric, ShellGeometry shell, double thickness_mm,
-             bool black_underlay)
-      : fabric_(std::move(fabric)),
+  ShellCloth(ClothFabric fabrics, ShellGeometry shell, double thickness_mm, bool black_underlay)
+      : fabrics_(std::move(fabrics)),
         shell_(std::move(shell)),
         black_underlay_(black_underlay),
         faces_(outer_faces(shell_)),
@@ -52,7 +51,7 @@ class ShellCloth : public Cloth {
     contact_mm_ = 0.01 * thickness_mm + 4e-7 * std::max({reach.x, reach.y, reach.z});
   }
 
-  [[nodiscard]] const Fabric& fabric() const override { return *fabric_; }
+  [[nodiscard]] const ClothFabric& fabrics() const override { return fabrics_; }
 
   [[nodiscard]] Meeting closest(const Ray& ray, double t_max_mm,
                                 const FibreHit* from) const override {
@@ -259,12 +258,11 @@ class ShellCloth : public Cloth {
     const Tetrahedron& tetrahedron = shell_.tetrahedra[k];
     const glm::dvec3 flat_start = tetrahedron.to_flat * ray.at(start) + tetrahedron.shift_mm;
     const glm::dvec3 flat_way = (end - start) * (tetrahedron.to_flat * ray.direction);
-    std::optional<transport::StrandCopy> ignored;
+    std::optional<FlatStart> own;
     if (from != nullptr) {
-      ignored = from->copy;
+      own = FlatStart{from->copy, from->fabric};
     }
-    const std::optional<FlatHit> found =
-        closest_in_flat(fabric_->scene(), flat_start, flat_way, ignored);
+    const std::optional<FlatHit> found = fabrics_.closest(flat_start, flat_way, own);
     if (!found) {
       return std::nullopt;
     }
@@ -272,15 +270,16 @@ class ShellCloth : public Cloth {
     hit.t_mm = start + found->share * (end - start);
     hit.segment = found->segment;
     hit.copy = found->copy;
+    hit.fabric = found->fabric;
     hit.place = k;
     hit.world_mm = ray.at(hit.t_mm);
     hit.flat_mm = flat_start + found->share * flat_way;
     hit.to_flat = tetrahedron.rotation;
-    hit.tangent = tangent_of(fabric_->tile(), hit.segment);
+    hit.tangent = tangent_of(fabric(hit).tile(), hit.segment);
     return hit;
   }
 
-  std::shared_ptr<const Fabric> fabric_;  // shared: several pieces may be of one fabric
+  ClothFabric fabrics_;
   ShellGeometry shell_;
   bool black_underlay_;
   std::vector<OuterFace> faces_;
@@ -294,11 +293,16 @@ class ShellCloth : public Cloth {
 std::unique_ptr<Cloth> make_shell_cloth(std::shared_ptr<const Fabric> fabric, const ObjMesh& mesh,
                                         const ShellPlacement& placement,
                                         std::vector<std::string>& remarks) {
-  CHECK(fabric != nullptr);
+  return make_shell_cloth(ClothFabric(std::move(fabric)), mesh, placement, remarks);
+}
+
+std::unique_ptr<Cloth> make_shell_cloth(ClothFabric fabrics, const ObjMesh& mesh,
+                                        const ShellPlacement& placement,
+                                        std::vector<std::string>& remarks) {
   ShellShape shape;
   shape.texture_mm = placement.texture_mm;
-  shape.flat_low_mm = static_cast<double>(fabric->tile().z_min_mm);
-  shape.flat_high_mm = static_cast<double>(fabric->tile().z_max_mm);
+  shape.flat_low_mm = fabrics.low_mm();
+  shape.flat_high_mm = fabrics.high_mm();
   shape.thickness_mm =
       placement.thickness_mm > 0 ? placement.thickness_mm : shape.flat_high_mm - shape.flat_low_mm;
   shape.flip_normals = placement.flip_normals;
@@ -314,7 +318,7 @@ std::unique_ptr<Cloth> make_shell_cloth(std::shared_ptr<const Fabric> fabric, co
                       std::to_string(shell.tetrahedra.size()) +
                       " tetrahedra of the shell hold no cloth: they or their texture are flat");
   }
-  return std::make_unique<ShellCloth>(std::move(fabric), std::move(shell), shape.thickness_mm,
+  return std::make_unique<ShellCloth>(std::move(fabrics), std::move(shell), shape.thickness_mm,
                                       placement.black_underlay);
 }
 

@@ -21,6 +21,11 @@ struct ShellPlacement {
 // Cloth mapped through a shell around a mesh, whose points are millimetres of the world. Adds to
 // `remarks` what a person should know: folds, and triangles that can hold no cloth. `fabric` is
 // shared by the pieces of one scene. Throws core::Error.
+[[nodiscard]] std::unique_ptr<Cloth> make_shell_cloth(ClothFabric fabrics, const ObjMesh& mesh,
+                                                      const ShellPlacement& placement,
+                                                      std::vector<std::string>& remarks);
+
+// The same of one fabric, which is shared by the pieces of one scene.
 [[nodiscard]] std::unique_ptr<Cloth> make_shell_cloth(std::shared_ptr<const Fabric> fabric,
                                                       const ObjMesh& mesh,
                                                       const ShellPlacement& placement,

@@ -28,11 +28,12 @@ float straight_azimuth(const glm::vec3& omega_i, const glm::vec3& omega_o) {
 DualIntegrator::DualIntegrator(const Scene& scene, bool local, Scattering scattering)
     : scene_(scene), local_(local), scattering_(scattering) {
   for (const auto& cloth : scene.cloths) {
-    const Fabric& fabric = cloth->fabric();
-    std::vector<DualFibre>& fibres = fibres_[&fabric];
-    if (fibres.empty()) {
-      for (const shading::FibreBcsdf& bcsdf : fabric.bcsdfs()) {
-        fibres.emplace_back(bcsdf);
+    for (const auto& fabric : cloth->fabrics().fabrics()) {
+      std::vector<DualFibre>& fibres = fibres_[fabric.get()];
+      if (fibres.empty()) {
+        for (const shading::FibreBcsdf& bcsdf : fabric->bcsdfs()) {
+          fibres.emplace_back(bcsdf);
+        }
       }
     }
   }
@@ -83,7 +84,7 @@ DualIntegrator::Arrival DualIntegrator::arrival(const SceneHit& hit, const glm::
       from = next.hit;
       left_mm -= next.t_mm;
     }
-    if (!cross(from.fibre, scene_.cloths[from.cloth]->fabric(), direction, result)) {
+    if (!cross(from.fibre, scene_.cloths[from.cloth]->fabric(from.fibre), direction, result)) {
       return {};
     }
   }
@@ -96,7 +97,7 @@ EyeSample DualIntegrator::trace(const Ray& eye_ray, core::Random& random) const 
     return {first.fate == Fate::kNothing ? scene_.background : glm::vec3(0), false};
   }
   const FibreHit& hit = first.hit.fibre;
-  const Fabric& fabric = scene_.cloths[first.hit.cloth]->fabric();
+  const Fabric& fabric = scene_.cloths[first.hit.cloth]->fabric(hit);
   const shading::FibreBcsdf& bcsdf = fabric.bcsdf_of_strand(hit.copy.strand);
   const DualFibre& fibre = fibre_of(fabric, hit.copy.strand);
   const glm::vec3 towards_eye = hit.to_flat * glm::vec3(-eye_ray.direction);

@@ -11,11 +11,12 @@ namespace weft::render {
 
 PrtIntegrator::PrtIntegrator(const Scene& scene, const PrtSettings& settings) : scene_(scene) {
   for (const auto& cloth : scene.cloths) {
-    const Fabric& fabric = cloth->fabric();
-    CHECK(fabric.precomputed() != nullptr);
-    std::unique_ptr<SegmentTransfer>& transfer = transfer_[&fabric];
-    if (!transfer) {
-      transfer = std::make_unique<SegmentTransfer>(fabric, settings);
+    for (const auto& fabric : cloth->fabrics().fabrics()) {
+      CHECK(fabric->precomputed() != nullptr);
+      std::unique_ptr<SegmentTransfer>& transfer = transfer_[fabric.get()];
+      if (!transfer) {
+        transfer = std::make_unique<SegmentTransfer>(*fabric, settings);
+      }
     }
   }
 }
@@ -32,7 +33,7 @@ EyeSample PrtIntegrator::trace(const Ray& ray, core::Random& random) const {
   }
   const FibreHit& hit = first.hit.fibre;
   const Cloth& cloth = *scene_.cloths[first.hit.cloth];
-  const Fabric& fabric = cloth.fabric();
+  const Fabric& fabric = cloth.fabric(hit);
   const ShadingPoint point = fabric.precomputed()->point(
       hit.segment, hit.tangent, glm::normalize(hit.to_flat * glm::vec3(-ray.direction)));
   const glm::dvec3 top_mm = cloth.top_point(hit, glm::dvec2(0)).value_or(hit.world_mm);
