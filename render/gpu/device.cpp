@@ -46,8 +46,9 @@ constexpr VkPipelineStageFlags kWork =
 }  // namespace
 
 void Device::State::open(const std::string& wanted) {
-  std::vector<Candidate> found = candidates(instance.handle());
+  const std::vector<Candidate> found = candidates(instance.handle());
   std::vector<DeviceInfo> infos;
+  infos.reserve(found.size());
   for (const Candidate& candidate : found) {
     infos.push_back(candidate.info);
   }
