@@ -11,6 +11,7 @@
 #include "render/gpu/geometry.h"
 #include "render/kernels/eye_ray.h"
 #include "render/scene.h"
+#include "render/shell_cloth.h"
 #include "tests/render_cloths.h"
 
 // The shared text of render/kernels/eye_ray.h, compiled as C++, against Embree through
@@ -64,6 +65,8 @@ void compare(Comparison& result, const Scene& scene, const gpu::GeometryArrays& 
   }
   const FibreHit& hit = expected.hit.fibre;
   const double apart = std::fabs(static_cast<double>(actual.t_mm) - hit.t_mm);
+  EXPECT_EQ(arrays.sources[static_cast<std::size_t>(actual.fabric)],
+            &scene.cloths[expected.hit.cloth]->fabric(hit));
   const bool same = actual.segment == static_cast<int>(hit.segment) &&
                     actual.cloth == static_cast<int>(expected.hit.cloth);
   // Two segments of one fibre share the sphere where they meet: either may be named.
@@ -166,6 +169,54 @@ TEST(March, MeetsTheFibresThatEmbreeMeetsInShells) {
     EXPECT_LE(result.different, 12);
     EXPECT_LE(result.at_joints, 60);
     EXPECT_LE(result.grazing, 30);
+  }
+}
+
+// Fibres along x at other places in each of its two fabrics.
+ClothFabric damask() {
+  std::vector<std::shared_ptr<const Fabric>> fabrics;
+  for (const std::uint64_t seed : {1, 2}) {
+    fabric::Tile tile = test::crossed_layers(4, 6, 0.04f, 6, seed);
+    tile.blocks = {2, 1};
+    fabrics.push_back(test::fabric_of(std::move(tile)));
+  }
+  BlockPattern pattern;
+  pattern.width = 3;
+  pattern.height = 2;
+  pattern.fabric = {0, 1, 1, 1, 0, 0};
+  return {std::move(fabrics), std::move(pattern)};
+}
+
+TEST(March, MeetsTheFibresThatEmbreeMeetsInPatternedCloth) {
+  FlatPlacement turned = sized(6);
+  turned.turn = 0.9;
+  turned.centre_mm = {20, -30, 5};
+  FlatPlacement endless = sized(6);
+  endless.endless = true;
+  std::vector<std::string> remarks;
+  ShellPlacement true_to_size;
+  true_to_size.texture_mm = {1, 1};
+  Cloths pieces;
+  pieces.push_back(make_flat_cloth(damask(), turned));
+  pieces.push_back(make_flat_cloth(damask(), endless));
+  pieces.push_back(
+      make_shell_cloth(damask(), test::sheet(40, 3, test::in_folds), true_to_size, remarks));
+  for (auto& piece : pieces) {
+    Cloths one;
+    one.push_back(std::move(piece));
+    const Scene scene = scene_of(std::move(one));
+    const gpu::GeometryArrays arrays = gpu::pack_geometry(scene.cloths);
+    ASSERT_EQ(arrays.fabrics.size(), 2U);
+    const Cloth::Bounds bounds = scene.cloths[0]->bounds();
+    Comparison result;
+    for (std::uint64_t i = 0; i < 3000; ++i) {
+      compare(result, scene, arrays,
+              eye_ray_at(0.5 * (bounds.low_mm + bounds.high_mm),
+                         0.5 * (bounds.high_mm - bounds.low_mm), i));
+    }
+    EXPECT_GT(result.met, 1000);
+    // Borders of blocks cut fibres, and a ray that grazes the cut may be on either side of it.
+    EXPECT_LE(result.different, 6);
   }
 }
 

@@ -153,7 +153,7 @@ TEST(BoundsTree, HoldsEveryBoxOnceWithinTheKernelsStack) {
         EXPECT_TRUE(glm::all(glm::lessThanEqual(node.low_mm, boxes[box].low_mm)));
         EXPECT_TRUE(glm::all(glm::greaterThanEqual(node.high_mm, boxes[box].high_mm)));
       }
-      if (node.count == 0) {
+      if (node.count < 0) {
         visits.push_back({static_cast<std::size_t>(node.first), visit.depth + 1});
         visits.push_back({static_cast<std::size_t>(node.first) + 1, visit.depth + 1});
       }

@@ -60,10 +60,11 @@ class Builder {
       if (task.last - task.first <= kLeafBoxes) {
         continue;
       }
-      const std::uint32_t middle = split(task);
+      const int axis = longest_axis(task);
+      const std::uint32_t middle = split(task, axis);
       const auto children = static_cast<std::uint32_t>(tree_.nodes.size());
       tree_.nodes[task.node].first = static_cast<int>(children);
-      tree_.nodes[task.node].count = 0;
+      tree_.nodes[task.node].count = -1 - axis;
       tree_.nodes.resize(children + 2);
       tasks.push_back({children, task.first, middle, task.depth + 1});
       tasks.push_back({children + 1, middle, task.last, task.depth + 1});
@@ -86,16 +87,26 @@ class Builder {
     node.count = static_cast<int>(task.last - task.first);
   }
 
-  // Orders the boxes of a task so that its children are two runs; returns where the second begins.
-  std::uint32_t split(const Task& task) {
+  [[nodiscard]] Box centres_of(const Task& task) const {
     Box centres = empty_box();
     for (std::uint32_t i = task.first; i < task.last; ++i) {
       const glm::vec3 centre = twice_centre(box(i));
       centres = both(centres, {centre, centre});
     }
+    return centres;
+  }
+
+  [[nodiscard]] int longest_axis(const Task& task) const {
+    const Box centres = centres_of(task);
     const glm::vec3 extent = centres.high_mm - centres.low_mm;
-    const int axis =
-        extent.x >= extent.y ? (extent.x >= extent.z ? 0 : 2) : (extent.y >= extent.z ? 1 : 2);
+    return extent.x >= extent.y ? (extent.x >= extent.z ? 0 : 2) : (extent.y >= extent.z ? 1 : 2);
+  }
+
+  // Orders the boxes of a task so that its children are two runs, the lower ones along the axis
+  // first; returns where the second begins.
+  std::uint32_t split(const Task& task, int axis) {
+    const Box centres = centres_of(task);
+    const glm::vec3 extent = centres.high_mm - centres.low_mm;
     const auto first = tree_.order.begin() + task.first;
     const auto last = tree_.order.begin() + task.last;
     if (task.depth < kHeuristicDepth && extent[axis] > 0) {

@@ -60,13 +60,14 @@ DeviceGeometry::DeviceGeometry(Device& device, const GeometryArrays& arrays)
       part(arrays.cloths, "pieces of cloth"), part(arrays.tetrahedra, "tetrahedra"),
       part(arrays.shell_triangles, "shell triangles"), part(arrays.nodes, "boxes of shells"),
       part(arrays.outer_faces, "outer faces of shells")};
-  const std::array<Part, 7> grid = {part(arrays.fabrics, "fabrics"),
+  const std::array<Part, 8> grid = {part(arrays.fabrics, "fabrics"),
                                     part(arrays.bricks, "bricks of voxels"),
                                     part(arrays.voxels, "voxels"),
                                     part(arrays.entries, "lists of fibres in voxels"),
                                     part(arrays.capsules, "fibres"),
                                     part(arrays.segments, "numbers of segments"),
-                                    part(arrays.nearest, "volumes of nearest segments")};
+                                    part(arrays.nearest, "volumes of nearest segments"),
+                                    part(arrays.patterns, "patterns")};
   check_room(device, arrays, solid);
   check_room(device, arrays, grid);
   for (const Part& each : solid) {

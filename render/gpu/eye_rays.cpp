@@ -21,7 +21,7 @@ static_assert(sizeof(EyeSearch) == 32 && offsetof(EyeSearch, walk) == 4);
 static_assert(sizeof(EyeTask) == 104 && offsetof(EyeTask, seed) == 64 &&
               offsetof(EyeTask, nearest_samples) == 100);
 
-constexpr std::uint32_t kBuffers = 15;    // of eye_rays.comp
+constexpr std::uint32_t kBuffers = 16;    // of eye_rays.comp
 constexpr std::uint32_t kGroupRays = 64;  // local_size_x of eye_rays.comp
 // A ray that is not finished after so many rounds of kEyeSteps runs through cloth that has nothing
 // in its way; it keeps what it has met before.

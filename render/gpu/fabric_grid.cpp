@@ -18,8 +18,8 @@ using shading::kBrickEdge;
 using shading::kBrickVoxels;
 
 static_assert(sizeof(DeviceCapsule) == 32);
-static_assert(sizeof(shading::DeviceFabric) == 60 &&
-              offsetof(shading::DeviceFabric, first_nearest) == 56);
+static_assert(sizeof(shading::DeviceFabric) == 68 &&
+              offsetof(shading::DeviceFabric, first_nearest) == 64);
 static_assert(kBrickVoxels == kBrickEdge * kBrickEdge * kBrickEdge);
 
 // By which capsules are taken to be larger when they are put into voxels, in voxels: more than what
@@ -205,6 +205,7 @@ FabricGrid build_fabric_grid(const fabric::Tile& tile, const GridSettings& setti
       continue;
     }
     grid.fabric.size_mm = tile.size_mm;
+    grid.fabric.blocks = glm::ivec2(tile.blocks);
     grid.fabric.z_low_mm = static_cast<float>(frame.low_mm.z);
     grid.fabric.z_high_mm = static_cast<float>(frame.low_mm.z + frame.voxels.z * frame.voxel_mm.z);
     grid.fabric.voxel_mm = glm::vec3(frame.voxel_mm);

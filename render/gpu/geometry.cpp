@@ -24,8 +24,8 @@ using shading::DeviceShellTriangle;
 using shading::DeviceTetrahedron;
 
 // As the scalar block layout of the kernels has them.
-static_assert(sizeof(DeviceCloth) == 108 && offsetof(DeviceCloth, to_flat) == 24 &&
-              offsetof(DeviceCloth, first_face) == 104);
+static_assert(sizeof(DeviceCloth) == 128 && offsetof(DeviceCloth, to_flat) == 44 &&
+              offsetof(DeviceCloth, first_face) == 124);
 static_assert(sizeof(DeviceTetrahedron) == 188 && offsetof(DeviceTetrahedron, normal_0) == 68 &&
               offsetof(DeviceTetrahedron, behind_0) == 132 &&
               offsetof(DeviceTetrahedron, bare) == 184);
@@ -53,6 +53,7 @@ void pack_flat(const FlatForm& form, DeviceCloth& cloth) {
   }
   // The CPU's kContactMm, and what single precision adds to it.
   cloth.contact_mm = static_cast<float>(1e-6 + 4 * kRounding * reach);
+  cloth.step_mm = static_cast<float>(1e-5 + 4 * kRounding * reach);
 }
 
 glm::vec3 relative(const glm::dvec3& point, const glm::dvec3& origin) {
@@ -67,7 +68,7 @@ void add_point(Box& box, const glm::vec3& point) {
 }
 
 DeviceTetrahedron packed(const Tetrahedron& tetrahedron, const glm::dvec3& centre,
-                         const glm::dvec2& tile_mm) {
+                         const glm::dvec2& unit_mm) {
   DeviceTetrahedron result{};
   const glm::dvec3& corner = tetrahedron.corners_mm[0];
   result.corner_mm = relative(corner, centre);
@@ -75,10 +76,10 @@ DeviceTetrahedron packed(const Tetrahedron& tetrahedron, const glm::dvec3& centr
   result.to_flat = glm::mat3(tetrahedron.to_flat);
   result.rotation = tetrahedron.rotation;
   const glm::dvec3 flat = tetrahedron.to_flat * corner + tetrahedron.shift_mm;
-  const glm::dvec2 tile = glm::floor(glm::dvec2(flat) / tile_mm);
-  result.flat_mm = glm::vec3(glm::dvec3(glm::dvec2(flat) - tile * tile_mm, flat.z));
-  result.flat_tile_x = static_cast<float>(tile.x);
-  result.flat_tile_y = static_cast<float>(tile.y);
+  const glm::dvec2 unit = glm::floor(glm::dvec2(flat) / unit_mm);
+  result.flat_mm = glm::vec3(glm::dvec3(glm::dvec2(flat) - unit * unit_mm, flat.z));
+  result.flat_unit_x = static_cast<float>(unit.x);
+  result.flat_unit_y = static_cast<float>(unit.y);
   const auto normal = [&](std::size_t i) { return glm::vec3(tetrahedron.normals[i]); };
   result.normal_0 = normal(0);
   result.normal_1 = normal(1);
@@ -145,14 +146,35 @@ class Packer {
     const ClothForm form = cloth.form();
     DeviceCloth packed_cloth{};
     packed_cloth.black_underlay = form.black_underlay ? 1 : 0;
-    packed_cloth.fabric = index_of(cloth.fabric());
+    const glm::dvec2 unit = add_fabrics(cloth.fabrics(), packed_cloth);
     if (const auto* flat = std::get_if<FlatForm>(&form.shape)) {
       pack_flat(*flat, packed_cloth);
     } else {
       const auto& shell = std::get<ShellForm>(form.shape);
-      add_shell(shell, cloth.bounds(), glm::dvec2(cloth.fabric().tile().size_mm), packed_cloth);
+      add_shell(shell, cloth.bounds(), unit, packed_cloth);
     }
     arrays_.cloths.push_back(packed_cloth);
+  }
+
+  // Returns the unit by which the flat fabric is divided.
+  glm::dvec2 add_fabrics(const ClothFabric& fabrics, DeviceCloth& cloth) {
+    std::vector<std::int32_t> indices;
+    for (const auto& fabric : fabrics.fabrics()) {
+      indices.push_back(index_of(*fabric));
+    }
+    cloth.fabric = indices.front();
+    glm::dvec2 unit(fabrics.fabrics().front()->tile().size_mm);
+    if (const BlockPattern* pattern = fabrics.pattern()) {
+      unit = pattern->block_mm;
+      cloth.pattern_width = static_cast<int>(pattern->width);
+      cloth.pattern_height = static_cast<int>(pattern->height);
+      cloth.first_pattern = next_index(arrays_.patterns.size(), pattern->fabric.size());
+      for (const std::uint32_t fabric : pattern->fabric) {
+        arrays_.patterns.push_back(indices[fabric]);
+      }
+    }
+    cloth.unit_mm = glm::vec2(unit);
+    return unit;
   }
 
   int index_of(const Fabric& fabric) {
@@ -180,14 +202,15 @@ class Packer {
   static int next_index(std::size_t size, std::size_t more) {
     constexpr auto kMost = static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
     if (size + more > kMost) {
-      throw core::Error(core::Code::kResourceExhausted,
-                        "the scene has more than " + std::to_string(kMost) +
-                            " tetrahedra, faces or voxels; use coarser meshes or fewer fabrics");
+      throw core::Error(
+          core::Code::kResourceExhausted,
+          "the scene has more than " + std::to_string(kMost) +
+              " tetrahedra, faces, voxels or blocks; use coarser meshes or fewer fabrics");
     }
     return static_cast<int>(size);
   }
 
-  void add_shell(const ShellForm& form, const Cloth::Bounds& bounds, const glm::dvec2& tile_mm,
+  void add_shell(const ShellForm& form, const Cloth::Bounds& bounds, const glm::dvec2& unit_mm,
                  DeviceCloth& cloth) {
     const ShellGeometry& shell = *form.geometry;
     // Rounded, so that the kernels' centre is the one that positions are relative to.
@@ -202,7 +225,7 @@ class Packer {
     cloth.first_node = static_cast<int>(arrays_.nodes.size());
     cloth.first_face = next_index(arrays_.outer_faces.size(), 4 * shell.tetrahedra.size());
     for (const Tetrahedron& tetrahedron : shell.tetrahedra) {
-      arrays_.tetrahedra.push_back(packed(tetrahedron, centre, tile_mm));
+      arrays_.tetrahedra.push_back(packed(tetrahedron, centre, unit_mm));
     }
     for (const ShellTriangle& triangle : shell.triangles) {
       arrays_.shell_triangles.push_back(packed(triangle, centre));
@@ -253,7 +276,8 @@ std::uint64_t bytes_of(const std::vector<T>& values) {
 std::uint64_t GeometryArrays::size_bytes() const {
   return bytes_of(cloths) + bytes_of(tetrahedra) + bytes_of(shell_triangles) + bytes_of(nodes) +
          bytes_of(outer_faces) + bytes_of(fabrics) + bytes_of(bricks) + bytes_of(voxels) +
-         bytes_of(entries) + bytes_of(capsules) + bytes_of(segments) + bytes_of(nearest);
+         bytes_of(entries) + bytes_of(capsules) + bytes_of(segments) + bytes_of(nearest) +
+         bytes_of(patterns);
 }
 
 GeometryArrays pack_geometry(std::span<const std::unique_ptr<Cloth>> cloths,

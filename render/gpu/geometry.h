@@ -30,6 +30,7 @@ struct GeometryArrays {
   std::vector<shading::DeviceCapsule> capsules;
   std::vector<std::uint32_t> segments;
   std::vector<std::uint32_t> nearest;
+  std::vector<std::int32_t> patterns;
 
   std::vector<const Fabric*> sources;  // of `fabrics`; DeviceHit::fabric is an index of both
 
@@ -90,6 +91,9 @@ using Geometry = const render::gpu::GeometryArrays*;
 }
 [[nodiscard]] inline int nearest_at(Geometry g, int index) {
   return static_cast<int>(g->nearest[static_cast<std::size_t>(index)]) - 1;
+}
+[[nodiscard]] inline int pattern_at(Geometry g, int index) {
+  return g->patterns[static_cast<std::size_t>(index)];
 }
 
 }  // namespace weft::shading

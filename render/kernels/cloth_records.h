@@ -22,12 +22,18 @@ struct DeviceCloth {
   int kind;
   int black_underlay;  // 0 or 1
   int fabric;          // index of its DeviceFabric; of a patterned piece, of the first one
-  vec3 centre_mm;      // of the piece, in the world
-  mat3 to_flat;        // flat: carries directions of the world into the flat fabric
-  vec3 low_mm;         // flat: the box of the cloth in the flat fabric, without its turn
+  // By which the flat fabric is divided: its tile, or the blocks of a pattern (BlockPattern of
+  // render/cloth_fabric.h).
+  vec2 unit_mm;
+  int pattern_width;  // in blocks; 0: all is of one fabric
+  int pattern_height;
+  int first_pattern;  // of the indices of fabrics, row by row
+  vec3 centre_mm;     // of the piece, in the world
+  mat3 to_flat;       // flat: carries directions of the world into the flat fabric
+  vec3 low_mm;        // flat: the box of the cloth in the flat fabric, without its turn
   vec3 high_mm;
   float contact_mm;  // meetings nearer than this with the cloth's own surface are rounding
-  float step_mm;     // shell: by which a ray goes on beyond a face
+  float step_mm;     // by which a ray goes on beyond a face or a border
   int first_tetrahedron;
   int first_triangle;
   int first_node;
@@ -38,9 +44,9 @@ struct DeviceCloth {
 struct DeviceTetrahedron {
   vec3 corner_mm;     // one of its corners, in the world, relative to the piece's centre
   mat3 to_flat;       // flat = to_flat (world - corner) + flat
-  vec3 flat_mm;       // of that corner, in its tile
-  float flat_tile_x;  // the tile, whole numbers
-  float flat_tile_y;
+  vec3 flat_mm;       // of that corner, in its unit of the flat fabric
+  float flat_unit_x;  // the unit, whole numbers
+  float flat_unit_y;
   // Face i is opposite to corner i: its unit normal points out, its plane is normal . (world -
   // corner) = offset.
   vec3 normal_0;
@@ -74,7 +80,8 @@ struct DeviceNode {
   vec3 low_mm;
   int first;  // inner node: of its two children, counted from the piece's first; leaf: first face
   vec3 high_mm;
-  int count;  // faces of a leaf; 0: an inner node
+  int count;  // faces of a leaf; -1, -2, -3: an inner node, whose first child lies lower along x,
+              // y, z
 };
 
 // A triangle of a shell's outside.

@@ -103,7 +103,7 @@ SHARED DeviceHit nearer_hit(DeviceHit hit, Geometry g, int cloth, EyeRay ray, Wa
   }
   hit.fate = result.walk.state == kWalkHit ? kHitFibre : kHitAbsorbed;
   hit.cloth = cloth;
-  hit.fabric = piece.fabric;
+  hit.fabric = result.hit.fabric;
   hit.place = result.walk.place;
   hit.segment = result.hit.segment;
   hit.t_mm = t;

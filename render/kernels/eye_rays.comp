@@ -10,9 +10,9 @@
 
 layout(local_size_x = 64) in;
 
-layout(set = 0, binding = 12, scalar) buffer HitBuffer { DeviceHit hits[]; };
-layout(set = 0, binding = 13, scalar) buffer SearchBuffer { EyeSearch searches[]; };
-layout(set = 0, binding = 14, scalar) buffer UnfinishedBuffer { uint unfinished; };
+layout(set = 0, binding = 13, scalar) buffer HitBuffer { DeviceHit hits[]; };
+layout(set = 0, binding = 14, scalar) buffer SearchBuffer { EyeSearch searches[]; };
+layout(set = 0, binding = 15, scalar) buffer UnfinishedBuffer { uint unfinished; };
 
 layout(push_constant, scalar) uniform Push { EyeTask task; };
 

@@ -1,4 +1,4 @@
-// Buffers of render/kernels/walk.h for a kernel: define GRID_BINDING, the first of the seven
+// Buffers of render/kernels/walk.h for a kernel: define GRID_BINDING, the first of the eight
 // bindings that they take, beside SOLID_BINDING (solid.glsl), and include this.
 // gpu::DeviceGeometry::grid_buffers() has them in order.
 #ifndef WEFT_RENDER_KERNELS_GRID_GLSL
@@ -29,6 +29,9 @@ layout(set = 0, binding = GRID_BINDING + 5, scalar) readonly buffer SegmentBuffe
 layout(set = 0, binding = GRID_BINDING + 6, scalar) readonly buffer NearestBuffer {
   uint device_nearest[];
 };
+layout(set = 0, binding = GRID_BINDING + 7, scalar) readonly buffer PatternBuffer {
+  int device_patterns[];
+};
 
 DeviceFabric fabric_at(Geometry g, int index) { return device_fabrics[index]; }
 int brick_at(Geometry g, int index) { return device_bricks[index]; }
@@ -37,6 +40,7 @@ uint entry_at(Geometry g, uint index) { return device_entries[index]; }
 DeviceCapsule capsule_at(Geometry g, int index) { return device_capsules[index]; }
 int segment_at(Geometry g, int index) { return int(device_segments[index]); }
 int nearest_at(Geometry g, int index) { return int(device_nearest[index]) - 1; }
+int pattern_at(Geometry g, int index) { return device_patterns[index]; }
 
 #include "render/kernels/eye_ray.h"
 

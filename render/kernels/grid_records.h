@@ -16,6 +16,7 @@ const int kBrickVoxels = 512;
 
 struct DeviceFabric {
   vec2 size_mm;    // of the tile
+  ivec2 blocks;    // equal parts of the tile that a pattern may show
   float z_low_mm;  // of the grid
   float z_high_mm;
   vec3 voxel_mm;

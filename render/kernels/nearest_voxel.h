@@ -8,34 +8,21 @@
 
 SHARED_BEGIN
 
-// `capsule` of what this returns is a segment of the tile. REQUIRES: the fabric has the volume.
-SHARED FlatMeeting sample_nearest(Geometry g, DeviceFabric fabric, FlatLine line, int samples) {
-  FlatMeeting meeting;
-  meeting.capsule = -1;
-  meeting.distance_mm = line.length_mm;
-  meeting.finished = true;
-  meeting.reached_mm = line.length_mm;
-  meeting.steps = 0;
+// The segment whose voxel a point of a fabric's tile lies in; -1: none. REQUIRES: the fabric has
+// the volume.
+SHARED int nearest_segment(Geometry g, DeviceFabric fabric, vec3 at_mm) {
   vec3 low = vec3(0.0f, 0.0f, fabric.z_low_mm);
   vec3 size = vec3(fabric.size_mm.x, fabric.size_mm.y, fabric.z_high_mm - fabric.z_low_mm);
-  float spacing = line.length_mm / float(samples);
-  while (meeting.steps < samples && meeting.capsule < 0) {
-    float t = (float(meeting.steps) + 0.5f) * spacing;
-    vec3 at = line.start_mm + t * line.direction;
-    at = vec3(wrapped(at.x, fabric.size_mm.x), wrapped(at.y, fabric.size_mm.y), at.z);
-    ivec3 voxel = ivec3(floor((at - low) / size * vec3(fabric.nearest_voxels)));
-    // Rounding may wrap a point to the tile's far border itself.
-    voxel.x = min(voxel.x, fabric.nearest_voxels.x - 1);
-    voxel.y = min(voxel.y, fabric.nearest_voxels.y - 1);
-    if (voxel.z >= 0 && voxel.z < fabric.nearest_voxels.z) {
-      meeting.capsule = nearest_at(
-          g, fabric.first_nearest + voxel.x +
-                 fabric.nearest_voxels.x * (voxel.y + fabric.nearest_voxels.y * voxel.z));
-      meeting.distance_mm = t;
-    }
-    ++meeting.steps;
+  vec3 in_tile = vec3(wrapped(at_mm.x, size.x), wrapped(at_mm.y, size.y), at_mm.z);
+  ivec3 voxel = ivec3(floor((in_tile - low) / size * vec3(fabric.nearest_voxels)));
+  if (voxel.z < 0 || voxel.z >= fabric.nearest_voxels.z) {
+    return -1;
   }
-  return meeting;
+  // Rounding may wrap a point to the tile's far border itself.
+  voxel.x = min(voxel.x, fabric.nearest_voxels.x - 1);
+  voxel.y = min(voxel.y, fabric.nearest_voxels.y - 1);
+  return nearest_at(g, fabric.first_nearest + voxel.x +
+                           fabric.nearest_voxels.x * (voxel.y + fabric.nearest_voxels.y * voxel.z));
 }
 
 SHARED_END

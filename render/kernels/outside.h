@@ -103,12 +103,9 @@ SHARED OuterHit outer_face_between(Geometry g, int cloth, LocalRay ray, vec2 spa
         nearest.face = node.first + i;
       }
     }
-    if (node.count == 0 && depth + 2 <= kTreeStack) {
+    if (node.count < 0 && depth + 2 <= kTreeStack) {
       // The child that lies nearer along the ray is taken from the stack first.
-      DeviceNode left = node_at(g, piece.first_node + node.first);
-      DeviceNode right = node_at(g, piece.first_node + node.first + 1);
-      vec3 apart = (right.low_mm + right.high_mm) - (left.low_mm + left.high_mm);
-      int nearer = dot(apart, ray.direction) >= 0.0f ? 0 : 1;
+      int nearer = ray.direction[-1 - node.count] >= 0.0f ? 0 : 1;
       stack[depth] = node.first + 1 - nearer;
       stack[depth + 1] = node.first + nearer;
       depth += 2;

@@ -1,10 +1,12 @@
 // Shared text (C++20 and GLSL): a ray's way through one piece of cloth, in stretches that one
 // affine map each carries into the flat fabric: the whole box of a flat piece, one tetrahedron of a
 // shell after the other. Does on the device what closest() of render/cloth.h does. The including
-// program defines what solid.h and grid_march.h ask for, and fabric_at.
+// program defines what solid.h, grid_march.h and nearest_voxel.h ask for, fabric_at, segment_at and
+// pattern_at.
 #ifndef WEFT_RENDER_KERNELS_WALK_H
 #define WEFT_RENDER_KERNELS_WALK_H
 
+#include "render/kernels/flat_place.h"
 #include "render/kernels/grid_march.h"
 #include "render/kernels/nearest_voxel.h"
 #include "render/kernels/solid.h"
@@ -32,6 +34,7 @@ struct Walk {
 
 // What of the fabric a walk has met, where its state is kWalkHit.
 struct WalkHit {
+  int fabric;
   int segment;
   vec3 flat_mm;
 };
@@ -42,12 +45,22 @@ struct WalkResult {
   int steps;
 };
 
-// A stretch, seen in the flat fabric.
+// A stretch, or what is left of it, seen in the flat fabric.
 struct FlatStretch {
-  FlatLine line;
-  vec2 tile_mm;  // the corner of the tile that the line starts in
-  float speed;   // millimetres in the flat fabric for one in the world
+  vec3 start_mm;  // from the corner of `unit`
+  vec2 unit;
+  vec3 direction;  // unit length
+  float length_mm;
+  float speed;  // millimetres in the flat fabric for one in the world
 };
+
+SHARED WalkHit no_hit() {
+  WalkHit hit;
+  hit.fabric = -1;
+  hit.segment = -1;
+  hit.flat_mm = vec3(0.0f, 0.0f, 0.0f);
+  return hit;
+}
 
 SHARED Walk walk_begin(LocalRay ray) {
   Walk walk;
@@ -145,8 +158,7 @@ SHARED Walk through_tetrahedron(DeviceTetrahedron tetrahedron, LocalRay ray, Wal
 // The next stretch of a shell, or none yet: then the state is kWalkOutside.
 SHARED WalkResult advance_in_shell(Geometry g, int cloth, LocalRay ray, Walk walk, float t_max_mm) {
   WalkResult result;
-  result.hit.segment = -1;
-  result.hit.flat_mm = vec3(0.0f, 0.0f, 0.0f);
+  result.hit = no_hit();
   result.steps = 1;
   result.walk = walk;
   DeviceCloth piece = cloth_at(g, cloth);
@@ -195,47 +207,84 @@ SHARED WalkResult advance_in_shell(Geometry g, int cloth, LocalRay ray, Walk wal
   return result;
 }
 
-SHARED FlatStretch flat_stretch(Geometry g, DeviceCloth piece, vec2 size_mm, LocalRay ray,
-                                Walk walk, float end_mm) {
+SHARED FlatStretch flat_stretch(Geometry g, DeviceCloth piece, LocalRay ray, Walk walk,
+                                float end_mm) {
   FlatStretch stretch;
-  vec3 at = point_at(ray, walk.start_mm);
+  stretch.start_mm = point_at(ray, walk.start_mm);
+  stretch.unit = vec2(0.0f, 0.0f);
   vec3 way = ray.direction;
-  stretch.tile_mm = vec2(0.0f, 0.0f);
   if (piece.kind == kClothShell) {
     DeviceTetrahedron here = tetrahedron_at(g, piece.first_tetrahedron + walk.place);
-    at = here.to_flat * (at - here.corner_mm) + here.flat_mm;
+    stretch.start_mm = here.to_flat * (stretch.start_mm - here.corner_mm) + here.flat_mm;
+    stretch.unit = vec2(here.flat_unit_x, here.flat_unit_y);
     way = here.to_flat * way;
-    stretch.tile_mm = vec2(here.flat_tile_x, here.flat_tile_y) * size_mm;
   }
-  vec2 tile = floor(vec2(at.x, at.y) / size_mm) * size_mm;
-  stretch.tile_mm = stretch.tile_mm + tile;
   stretch.speed = length(way);
-  stretch.line.start_mm = vec3(at.x - tile.x, at.y - tile.y, at.z);
-  stretch.line.direction = way / stretch.speed;
-  stretch.line.length_mm = (end_mm - walk.start_mm) * stretch.speed;
+  stretch.direction = way / stretch.speed;
+  stretch.length_mm = (end_mm - walk.start_mm) * stretch.speed;
   return stretch;
 }
 
-// The fibre that a walk meets in its stretch. With samples > 0 the paper's way: so many points,
-// spaced evenly, in the volume of nearest segments.
-SHARED WalkResult search_stretch(Geometry g, DeviceCloth piece, LocalRay ray, Walk walk,
-                                 float end_mm, ivec2 samples_and_steps) {
+SHARED WalkHit hit_at(DeviceCloth piece, FlatPlace place, vec3 onwards_mm, int segment) {
+  WalkHit hit;
+  hit.fabric = place.fabric;
+  hit.segment = segment;
+  vec3 in_unit = place.in_unit_mm + onwards_mm;
+  hit.flat_mm = vec3(in_unit.x + place.unit.x * piece.unit_mm.x,
+                     in_unit.y + place.unit.y * piece.unit_mm.y, in_unit.z);
+  return hit;
+}
+
+// The paper's way through a stretch: the first of so many points, spaced evenly, whose voxel of the
+// volume of nearest segments is not empty.
+SHARED WalkResult sample_stretch(Geometry g, DeviceCloth piece, FlatStretch stretch, Walk walk,
+                                 int samples) {
   WalkResult result;
   result.walk = walk;
-  result.hit.segment = -1;
-  result.hit.flat_mm = vec3(0.0f, 0.0f, 0.0f);
-  DeviceFabric fabric = fabric_at(g, piece.fabric);
-  FlatStretch stretch = flat_stretch(g, piece, fabric.size_mm, ray, walk, end_mm);
-  FlatMeeting meeting;
-  if (samples_and_steps.x > 0) {
-    meeting = sample_nearest(g, fabric, stretch.line, samples_and_steps.x);
-    result.hit.segment = meeting.capsule;
-  } else {
-    meeting = march_grid(g, fabric, stretch.line, samples_and_steps.y);
-    if (meeting.capsule >= 0) {
-      result.hit.segment = segment_at(g, meeting.capsule);
+  result.hit = no_hit();
+  result.steps = 0;
+  float spacing = stretch.length_mm / float(samples);
+  while (result.steps < samples && result.hit.segment < 0) {
+    float distance_mm = (float(result.steps) + 0.5f) * spacing;
+    vec3 at = stretch.start_mm + distance_mm * stretch.direction;
+    FlatPlace place = flat_place(g, piece, at, stretch.unit, vec2(0.0f, 0.0f));
+    int segment = nearest_segment(g, fabric_at(g, place.fabric), place.in_tile_mm);
+    if (segment >= 0) {
+      result.hit = hit_at(piece, place, vec3(0.0f, 0.0f, 0.0f), segment);
+      result.walk.state = kWalkHit;
+      result.walk.t_mm = walk.start_mm + distance_mm / stretch.speed;
     }
+    ++result.steps;
   }
+  return result;
+}
+
+// The fibre that a walk meets in its stretch; of patterned cloth, in the first block of what is
+// left of it.
+SHARED WalkResult march_stretch(Geometry g, DeviceCloth piece, FlatStretch stretch, Walk walk,
+                                int most_steps) {
+  WalkResult result;
+  result.walk = walk;
+  result.hit = no_hit();
+  // Far enough that rounding does not hold the ray in the block that it leaves.
+  float slack = (piece.step_mm + 2.4e-7f * abs(walk.start_mm)) * stretch.speed;
+  vec2 ahead = slack * vec2(stretch.direction.x, stretch.direction.y);
+  FlatPlace place = flat_place(g, piece, stretch.start_mm, stretch.unit, ahead);
+  FlatLine line;
+  line.start_mm = place.in_tile_mm;
+  line.direction = stretch.direction;
+  line.length_mm = stretch.length_mm;
+  bool goes_on = false;
+  if (piece.pattern_width > 0) {
+    vec2 border = vec2(line.direction.x > 0.0f ? piece.unit_mm.x : 0.0f,
+                       line.direction.y > 0.0f ? piece.unit_mm.y : 0.0f);
+    float to_x = (border.x - place.in_unit_mm.x) * inverse_of(line.direction.x);
+    float to_y = (border.y - place.in_unit_mm.y) * inverse_of(line.direction.y);
+    float leave = max(min(to_x, to_y), slack);
+    goes_on = leave < line.length_mm;
+    line.length_mm = min(line.length_mm, leave);
+  }
+  FlatMeeting meeting = march_grid(g, fabric_at(g, place.fabric), line, most_steps);
   result.steps = meeting.steps;
   if (!meeting.finished) {
     result.walk.state = kWalkHalted;
@@ -243,23 +292,25 @@ SHARED WalkResult search_stretch(Geometry g, DeviceCloth piece, LocalRay ray, Wa
   } else if (meeting.capsule >= 0) {
     result.walk.state = kWalkHit;
     result.walk.t_mm = walk.start_mm + meeting.distance_mm / stretch.speed;
-    vec3 in_tile = stretch.line.start_mm + meeting.distance_mm * stretch.line.direction;
-    result.hit.flat_mm =
-        vec3(in_tile.x + stretch.tile_mm.x, in_tile.y + stretch.tile_mm.y, in_tile.z);
+    result.hit =
+        hit_at(piece, place, meeting.distance_mm * line.direction, segment_at(g, meeting.capsule));
+  } else if (goes_on) {
+    result.walk.state = kWalkHalted;
+    result.walk.start_mm = walk.start_mm + line.length_mm / stretch.speed;
   }
   return result;
 }
 
 // Goes on with a walk through one piece until something is met before t_max_mm, the piece is left
-// behind, or about samples_and_steps.y steps are done: is_done() tells. `ray` is the piece's local
+// behind, or about samples_and_steps.y steps are done: is_done() tells. samples_and_steps.x > 0:
+// the paper's search, with so many points. `ray` is the piece's local
 // ray, of a flat piece turned into the flat fabric (ray_of_piece).
 SHARED WalkResult walk_on(Geometry g, int cloth, LocalRay ray, Walk walk, float t_max_mm,
                           ivec2 samples_and_steps) {
   DeviceCloth piece = cloth_at(g, cloth);
   WalkResult result;
   result.walk = walk;
-  result.hit.segment = -1;
-  result.hit.flat_mm = vec3(0.0f, 0.0f, 0.0f);
+  result.hit = no_hit();
   result.steps = 0;
   while (!is_done(result.walk) && result.steps < samples_and_steps.y) {
     int steps = result.steps + 1;
@@ -276,8 +327,12 @@ SHARED WalkResult walk_on(Geometry g, int cloth, LocalRay ray, Walk walk, float 
     }
     float end = min(result.walk.end_mm, t_max_mm);
     if (result.walk.state == kWalkInside && !bare && end > result.walk.start_mm) {
-      ivec2 left = ivec2(samples_and_steps.x, samples_and_steps.y - steps);
-      result = search_stretch(g, piece, ray, result.walk, end, left);
+      FlatStretch stretch = flat_stretch(g, piece, ray, result.walk, end);
+      if (samples_and_steps.x > 0) {
+        result = sample_stretch(g, piece, stretch, result.walk, samples_and_steps.x);
+      } else {
+        result = march_stretch(g, piece, stretch, result.walk, samples_and_steps.y - steps);
+      }
       steps += result.steps;
     }
     result.steps = steps;

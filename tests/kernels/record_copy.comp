@@ -39,6 +39,7 @@ void put(vec2 x) { put(x.x); put(x.y); }
 void put(vec3 x) { put(x.xy); put(x.z); }
 void put(vec4 x) { put(x.xy); put(x.zw); }
 void put(uvec2 x) { put(x.x); put(x.y); }
+void put(ivec2 x) { put(x.x); put(x.y); }
 void put(ivec3 x) { put(x.x); put(x.y); put(x.z); }
 void put(mat3 x) { put(x[0]); put(x[1]); put(x[2]); }
 

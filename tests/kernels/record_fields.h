@@ -16,11 +16,12 @@
   F(fate) F(cloth) F(fabric) F(place) F(segment) F(t_mm) F(world_mm) F(flat_mm) F(to_eye)
 
 #define FIELDS_OF_CLOTH(F) \
-  F(kind) F(black_underlay) F(fabric) F(centre_mm) F(to_flat) F(low_mm) F(high_mm) \
-  F(contact_mm) F(step_mm) F(first_tetrahedron) F(first_triangle) F(first_node) F(first_face)
+  F(kind) F(black_underlay) F(fabric) F(unit_mm) F(pattern_width) F(pattern_height) \
+  F(first_pattern) F(centre_mm) F(to_flat) F(low_mm) F(high_mm) F(contact_mm) F(step_mm) \
+  F(first_tetrahedron) F(first_triangle) F(first_node) F(first_face)
 
 #define FIELDS_OF_TETRAHEDRON(F) \
-  F(corner_mm) F(to_flat) F(flat_mm) F(flat_tile_x) F(flat_tile_y) F(normal_0) F(normal_1) \
+  F(corner_mm) F(to_flat) F(flat_mm) F(flat_unit_x) F(flat_unit_y) F(normal_0) F(normal_1) \
   F(normal_2) F(normal_3) F(offsets_mm) F(behind_0) F(behind_1) F(behind_2) F(behind_3) \
   F(rotation) F(bare)
 
@@ -59,8 +60,8 @@
   F(first_of_page) F(cells) F(blend_low) F(blend_high) F(gamma_method)
 
 #define FIELDS_OF_FABRIC(F) \
-  F(size_mm) F(z_low_mm) F(z_high_mm) F(voxel_mm) F(bricks) F(first_brick) F(nearest_voxels) \
-  F(first_nearest)
+  F(size_mm) F(blocks) F(z_low_mm) F(z_high_mm) F(voxel_mm) F(bricks) F(first_brick) \
+  F(nearest_voxels) F(first_nearest)
 
 #define FIELDS_OF_CAPSULE(F) \
   F(middle_mm) F(radius_mm) F(axis) F(half_length_mm)
