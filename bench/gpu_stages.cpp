@@ -62,7 +62,7 @@ struct Probe {
 
 GeometryView view_of(const gpu::GeometryArrays& a) {
   return {a.cloths, a.tetrahedra, a.shell_triangles, a.nodes,    a.outer_faces, a.fabrics,
-          a.bricks, a.voxels,     a.entries,         a.capsules, a.segments};
+          a.bricks, a.voxels,     a.entries,         a.capsules, a.segments,    a.patterns};
 }
 
 double time_shadow_rays(gpu::Device& device, const gpu::DeviceGeometry& geometry,

@@ -61,6 +61,7 @@ DeviceCapsule capsule_at(Geometry g, int index) {
 int segment_at(Geometry g, int index) {
   return static_cast<int>(bench::counted(g, g->view.segments, at(index), 0));
 }
+int pattern_at(Geometry g, int index) { return bench::counted(g, g->view.patterns, at(index), 12); }
 int nearest_at(Geometry /*g*/, int /*index*/) { return -1; }  // the exact search is measured
 
 }  // namespace

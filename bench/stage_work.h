@@ -32,6 +32,7 @@ struct GeometryView {
   std::span<const std::uint32_t> entries;
   std::span<const shading::DeviceCapsule> capsules;
   std::span<const std::uint32_t> segments;
+  std::span<const std::int32_t> patterns;
 };
 
 struct WorldRay {
