@@ -3,6 +3,8 @@
 // and draped: CPU time of all threads for a million rays (docs/performance.md).
 // Usage: bench_eye_rays MESH.obj FABRIC...
 
+#include "render/gpu/eye_rays.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -16,7 +18,6 @@
 #include "core/random.h"
 #include "render/draw.h"
 #include "render/flat_cloth.h"
-#include "render/gpu/eye_rays.h"
 #include "render/load_fabric.h"
 #include "render/obj_mesh.h"
 #include "render/scene.h"
@@ -170,9 +171,10 @@ void print_row(gpu::Device& device, const std::string& name, const char* shape, 
     gpu::EyeRays nearest(device, geometry, view, batch.rays());
     std::printf(" %.1f %% |", 100 * differing(by_device(device, nearest, batch), embree));
   }
-  const double fibres = static_cast<double>(
-      std::count_if(embree.begin(), embree.end(),
-                    [](const Seen& one) { return one.fate == shading::kHitFibre; }));
+  const double fibres =
+      static_cast<double>(std::count_if(embree.begin(), embree.end(), [](const Seen& one) {
+        return one.fate == shading::kHitFibre;
+      }));
   std::printf(" %.0f %% | %.1f | %.2f |\n", 100 * fibres / static_cast<double>(embree.size()),
               static_cast<double>(arrays.size_bytes() - arrays.nearest.size() * 4) / (1 << 20),
               build * kMillions);
@@ -186,10 +188,11 @@ int bench(int argc, char** argv) {
   }
   const ObjMesh mesh = read_obj(argv[1]);
   const auto device = gpu::Device::open();
-  std::printf("| fabric | Embree, s | C++, s | %s, s | C++ differs | kernel differs | 32 | 64 | 128 "
-              "samples differ | fibres seen | MiB | built in, s |\n"
-              "|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-              device->info().name.c_str());
+  std::printf(
+      "| fabric | Embree, s | C++, s | %s, s | C++ differs | kernel differs | 32 | 64 | 128 "
+      "samples differ | fibres seen | MiB | built in, s |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+      device->info().name.c_str());
   for (int i = 2; i < argc; ++i) {
     const LoadedFabric fabric = load_fabric(argv[i], Fabric::Wanted::kFibres);
     print_row(*device, fabric.name, "flat", flat_scene(fabric.fabric));

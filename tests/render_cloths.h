@@ -69,4 +69,19 @@ inline std::unique_ptr<render::Cloth> shell_of(std::shared_ptr<const render::Fab
   return render::make_shell_cloth(std::move(fabric), mesh, placement, remarks);
 }
 
+// Two fabrics whose fibres lie at other places, in a pattern of 3 x 2 blocks.
+inline render::ClothFabric damask() {
+  std::vector<std::shared_ptr<const render::Fabric>> fabrics;
+  for (const std::uint64_t seed : {1, 2}) {
+    fabric::Tile tile = crossed_layers(4, 6, 0.04f, 6, seed);
+    tile.blocks = {2, 1};
+    fabrics.push_back(fabric_of(std::move(tile)));
+  }
+  render::BlockPattern pattern;
+  pattern.width = 3;
+  pattern.height = 2;
+  pattern.fabric = {0, 1, 1, 1, 0, 0};
+  return {std::move(fabrics), std::move(pattern)};
+}
+
 }  // namespace weft::test

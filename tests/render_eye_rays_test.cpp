@@ -26,8 +26,8 @@ using shading::DeviceHit;
 constexpr std::uint32_t kWidth = 96;
 constexpr std::uint32_t kHeight = 80;
 
-// Two pieces of one fabric and one of another, one in front of the other.
-Scene three_pieces(bool perspective) {
+// Two pieces of one fabric, one of another and a patterned one, one in front of the other.
+Scene four_pieces(bool perspective) {
   Scene scene;
   const auto crossed = test::fabric_of(test::crossed_layers(4, 6, 0.05f, 2));
   const auto hairs = test::fabric_of(test::random_hairs(150, 0.5f, 0.4f, 0.3f, 1));
@@ -41,6 +41,8 @@ Scene three_pieces(bool perspective) {
   swatch.size_mm = {2, 1.5};
   swatch.centre_mm = {-1.5, -1, 1.5};
   scene.cloths.push_back(make_flat_cloth(hairs, swatch));
+  swatch.centre_mm = {1.5, 1.2, 1};
+  scene.cloths.push_back(make_flat_cloth(test::damask(), swatch));
   Camera::View view;
   view.position_mm = {4, -20, 25};
   view.look_at_mm = {0, 0, 0};
@@ -99,7 +101,8 @@ class EyeRays : public testing::Test {
 std::unique_ptr<gpu::Device> EyeRays::device_;
 
 bool same_hit(const DeviceHit& a, const DeviceHit& b) {
-  return a.fate == b.fate && a.cloth == b.cloth && a.segment == b.segment && a.place == b.place;
+  return a.fate == b.fate && a.cloth == b.cloth && a.fabric == b.fabric && a.segment == b.segment &&
+         a.place == b.place;
 }
 
 gpu::EyeBatch whole_picture(std::uint32_t samples) {
@@ -112,7 +115,7 @@ gpu::EyeBatch whole_picture(std::uint32_t samples) {
 
 TEST_F(EyeRays, TheKernelDoesWhatItsTextDoesInCpp) {
   for (const bool perspective : {true, false}) {
-    const Scene scene = three_pieces(perspective);
+    const Scene scene = four_pieces(perspective);
     gpu::GeometrySettings settings;
     settings.nearest_volume = true;
     const gpu::GeometryArrays arrays = gpu::pack_geometry(scene.cloths, settings);
@@ -144,7 +147,7 @@ TEST_F(EyeRays, TheKernelDoesWhatItsTextDoesInCpp) {
 }
 
 TEST_F(EyeRays, ShowTheSegmentsThatTheCpuShows) {
-  const Scene scene = three_pieces(true);
+  const Scene scene = four_pieces(true);
   const gpu::GeometryArrays arrays = gpu::pack_geometry(scene.cloths);
   const gpu::DeviceGeometry geometry(*device_, arrays);
   const gpu::EyeView view = view_of(scene);
@@ -179,7 +182,7 @@ TEST_F(EyeRays, ShowTheSegmentsThatTheCpuShows) {
 }
 
 TEST_F(EyeRays, DoNotDependOnHowAPictureIsDivided) {
-  const Scene scene = three_pieces(true);
+  const Scene scene = four_pieces(true);
   const gpu::GeometryArrays arrays = gpu::pack_geometry(scene.cloths);
   const gpu::DeviceGeometry geometry(*device_, arrays);
   const gpu::EyeBatch whole = whole_picture(3);
@@ -240,7 +243,7 @@ TEST_F(EyeRays, GoOnWhereOneRoundDoesNotSuffice) {
 }
 
 TEST_F(EyeRays, GeometryThatDoesNotFitIsRefusedWithFigures) {
-  const Scene scene = three_pieces(true);
+  const Scene scene = four_pieces(true);
   gpu::GeometryArrays arrays = gpu::pack_geometry(scene.cloths);
   EXPECT_GT(arrays.size_bytes(), arrays.capsules.size() * sizeof(shading::DeviceCapsule));
   gpu::GridSettings settings;

@@ -172,21 +172,6 @@ TEST(March, MeetsTheFibresThatEmbreeMeetsInShells) {
   }
 }
 
-// Fibres along x at other places in each of its two fabrics.
-ClothFabric damask() {
-  std::vector<std::shared_ptr<const Fabric>> fabrics;
-  for (const std::uint64_t seed : {1, 2}) {
-    fabric::Tile tile = test::crossed_layers(4, 6, 0.04f, 6, seed);
-    tile.blocks = {2, 1};
-    fabrics.push_back(test::fabric_of(std::move(tile)));
-  }
-  BlockPattern pattern;
-  pattern.width = 3;
-  pattern.height = 2;
-  pattern.fabric = {0, 1, 1, 1, 0, 0};
-  return {std::move(fabrics), std::move(pattern)};
-}
-
 TEST(March, MeetsTheFibresThatEmbreeMeetsInPatternedCloth) {
   FlatPlacement turned = sized(6);
   turned.turn = 0.9;
@@ -197,10 +182,10 @@ TEST(March, MeetsTheFibresThatEmbreeMeetsInPatternedCloth) {
   ShellPlacement true_to_size;
   true_to_size.texture_mm = {1, 1};
   Cloths pieces;
-  pieces.push_back(make_flat_cloth(damask(), turned));
-  pieces.push_back(make_flat_cloth(damask(), endless));
+  pieces.push_back(make_flat_cloth(test::damask(), turned));
+  pieces.push_back(make_flat_cloth(test::damask(), endless));
   pieces.push_back(
-      make_shell_cloth(damask(), test::sheet(40, 3, test::in_folds), true_to_size, remarks));
+      make_shell_cloth(test::damask(), test::sheet(40, 3, test::in_folds), true_to_size, remarks));
   for (auto& piece : pieces) {
     Cloths one;
     one.push_back(std::move(piece));

@@ -86,15 +86,16 @@ struct Needs {
 Needs needs_of(const Scene& scene, const GeometryArrays& geometry) {
   Needs needs;
   for (std::size_t cloth = 0; cloth < scene.cloths.size(); ++cloth) {
-    const Fabric* fabric =
-        geometry.sources[static_cast<std::size_t>(geometry.cloths[cloth].fabric)];
-    CHECK(fabric->precomputed() != nullptr);
-    const auto harmonics =
-        static_cast<std::uint32_t>(fabric->precomputed()->tables().sizes.harmonics);
-    needs.harmonics = std::max(needs.harmonics, harmonics);
-    if (scene.cloths[cloth]->constant_rotation()) {
-      needs.cell_entries +=
-          std::uint64_t{3} * harmonics * fabric->precomputed()->database().cell_paths.size();
+    for (const int index : geometry.fabrics_of(cloth)) {
+      const Fabric* fabric = geometry.sources[static_cast<std::size_t>(index)];
+      CHECK(fabric->precomputed() != nullptr);
+      const auto harmonics =
+          static_cast<std::uint32_t>(fabric->precomputed()->tables().sizes.harmonics);
+      needs.harmonics = std::max(needs.harmonics, harmonics);
+      if (scene.cloths[cloth]->constant_rotation()) {
+        needs.cell_entries +=
+            std::uint64_t{3} * harmonics * fabric->precomputed()->database().cell_paths.size();
+      }
     }
   }
   return needs;
@@ -173,11 +174,12 @@ void DeviceDrawing::put_on_device() {
                         sizes.harmonics) +
                     ShadingPass::cell_bytes(needs.cell_entries, parts.lights));
   for (std::size_t cloth = 0; cloth < scene_.cloths.size(); ++cloth) {
-    const int fabric = geometry.cloths[cloth].fabric;
-    const auto index = static_cast<std::size_t>(fabric);
-    parts.pieces.push_back({static_cast<int>(cloth), fabric, tables[index],
-                            scene_.cloths[cloth]->constant_rotation().has_value(),
-                            fabrics_[index]->precomputed()->settings()});
+    for (const int fabric : geometry.fabrics_of(cloth)) {
+      const auto index = static_cast<std::size_t>(fabric);
+      parts.pieces.push_back({static_cast<int>(cloth), fabric, tables[index],
+                              scene_.cloths[cloth]->constant_rotation().has_value(),
+                              fabrics_[index]->precomputed()->settings()});
+    }
   }
   on_device_ = std::make_unique<OnDevice>(
       renderer_.device(), geometry, eye_view_of(scene_, settings_), sizes, std::move(parts),

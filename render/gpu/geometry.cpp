@@ -273,6 +273,18 @@ std::uint64_t bytes_of(const std::vector<T>& values) {
 
 }  // namespace
 
+std::vector<int> GeometryArrays::fabrics_of(std::size_t cloth) const {
+  const DeviceCloth& piece = cloths[cloth];
+  if (piece.pattern_width == 0) {
+    return {piece.fabric};
+  }
+  const auto first = patterns.begin() + piece.first_pattern;
+  std::vector<int> shown(first, first + piece.pattern_width * piece.pattern_height);
+  std::sort(shown.begin(), shown.end());
+  shown.erase(std::unique(shown.begin(), shown.end()), shown.end());
+  return shown;
+}
+
 std::uint64_t GeometryArrays::size_bytes() const {
   return bytes_of(cloths) + bytes_of(tetrahedra) + bytes_of(shell_triangles) + bytes_of(nodes) +
          bytes_of(outer_faces) + bytes_of(fabrics) + bytes_of(bricks) + bytes_of(voxels) +

@@ -34,6 +34,8 @@ struct GeometryArrays {
 
   std::vector<const Fabric*> sources;  // of `fabrics`; DeviceHit::fabric is an index of both
 
+  // Indices of the fabrics that a piece shows, each once, in rising order.
+  [[nodiscard]] std::vector<int> fabrics_of(std::size_t cloth) const;
   // Bytes of device memory that the arrays take.
   [[nodiscard]] std::uint64_t size_bytes() const;
 };
