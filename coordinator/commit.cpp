@@ -16,10 +16,6 @@ namespace weft::coordinator {
 
 namespace {
 
-// The filter of multiple-scattering shadows, in mean free paths: an assumption until the constant
-// is fitted to paths traced across a shadow's edge (docs/database_format.md, /cells).
-constexpr float kShadowSigmaMfp = 2.0F;
-
 const char* const kSoftware = "weft, fabric database schema 1";
 
 std::string json_of(const google::protobuf::Message& message) {
@@ -59,7 +55,7 @@ shading::FibreMaterial fibre_material(const v1::Material& material) {
 // Folds a stage into `database`. Stages come in an order in which they can be planned, so those
 // that this one needs are folded.
 void fold(const FinishedStage& finished, const v1::FabricDescription& description,
-          const ReadBlob& read_blob, storage::FabricDatabase& database) {
+          const ReadBlob& read_blob, storage::FabricDatabase& database, double& shadow_fit_error) {
   switch (finished.stage.name) {
     case StageName::kGeometry:
       return fold_geometry(finished, read_blob, database);
@@ -77,6 +73,9 @@ void fold(const FinishedStage& finished, const v1::FabricDescription& descriptio
         database.materials.push_back(fibre_material(material));
       }
       return fold_transfer(finished, read_blob, database);
+    case StageName::kShadow:
+      shadow_fit_error = fold_shadow(finished, read_blob, database);
+      return;
   }
   core::check_failed(__FILE__, __LINE__, "unknown stage");
 }
@@ -90,7 +89,7 @@ core::Digest digest_of_results(const FinishedStage& finished) {
   return hasher.finish();
 }
 
-std::string stages_json(const std::vector<FinishedStage>& stages) {
+std::string stages_json(const std::vector<FinishedStage>& stages, double shadow_fit_error) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const StageName name : all_stages()) {
     const auto found = std::find_if(stages.begin(), stages.end(), [name](const FinishedStage& s) {
@@ -103,6 +102,9 @@ std::string stages_json(const std::vector<FinishedStage>& stages) {
     entry["results_sha256"] = digest_of_results(*found).hex();
     if (name != StageName::kGeometry) {  // that one's is the description itself
       entry["spec"] = nlohmann::ordered_json::parse(json_of(found->stage.spec));
+    }
+    if (name == StageName::kShadow) {
+      entry["fit_error"] = shadow_fit_error;
     }
     list.push_back(entry);
   }
@@ -117,20 +119,20 @@ core::Digest commit(const v1::FabricDescription& description,
                     const std::filesystem::path& path) {
   // The job is planned again, stage by stage: what is merged is what the plan says.
   storage::FabricDatabase database;
+  double shadow_fit_error = 0;
   std::vector<FinishedStage> stages;
   std::vector<StageResults> finished;
   for (std::vector<Stage> planned = plan(description, finished, read_blob); !planned.empty();
        planned = plan(description, finished, read_blob)) {
     for (Stage& stage : planned) {
       stages.push_back(take_results(std::move(stage), results));
-      fold(stages.back(), description, read_blob, database);
+      fold(stages.back(), description, read_blob, database, shadow_fit_error);
       finished.push_back({stages.back().stage.name, stages.back().shards});
     }
   }
   database.c_s = storage::scattering_tables(database.materials, database.sh_order);
-  database.sigma_shadow_mm = kShadowSigmaMfp * database.mean_free_path_mm;
   database.description_json = json_of(description);
-  database.stages_json = stages_json(stages);
+  database.stages_json = stages_json(stages, shadow_fit_error);
   database.software = kSoftware;
   return storage::write_database(database, path);
 }

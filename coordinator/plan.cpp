@@ -18,6 +18,10 @@ namespace {
 
 constexpr std::uint64_t kSegmentsPerShard = 64;
 constexpr std::uint32_t kPathsPerShard = 16'384;
+constexpr std::uint32_t kShadowPathsPerShard = 4096;
+// Light that travels farther than 16 mean free paths is beyond all that is fitted.
+constexpr std::uint32_t kShadowBins = 256;
+constexpr double kShadowBinMfp = 1.0 / 16;
 
 // Enters every shard's digest. Raised when a baker gives other bytes for the same spec and inputs,
 // so that results of the older program are not taken for the newer one's.
@@ -30,6 +34,7 @@ enum class Purpose : std::uint32_t {
   kBasis = 0x103,
   kRotation = 0x104,
   kTransfer = 0x105,
+  kShadow = 0x106,
 };
 
 std::uint64_t seed_for(const v1::FabricDescription& description, Purpose purpose) {
@@ -51,6 +56,18 @@ std::uint32_t grid_rays(v1::Quality quality) {
 
 // A cell's segments are drawn by these counts: thousands for a cell together.
 constexpr std::uint32_t kSeenRaysPerSegment = 16;
+
+// Paths from which the spread of shadows is fitted: 1 to 0.2 %.
+std::uint32_t shadow_paths(v1::Quality quality) {
+  switch (quality) {
+    case v1::QUALITY_PREVIEW:
+      return 1U << 14;
+    case v1::QUALITY_BEST:
+      return 1U << 18;
+    default:
+      return 1U << 16;
+  }
+}
 
 std::uint64_t ceil_div(std::uint64_t count, std::uint64_t divisor) {
   return (count + divisor - 1) / divisor;
@@ -197,6 +214,24 @@ Stage transfer_stage(const v1::FabricDescription& description,
   return stage;
 }
 
+Stage shadow_stage(const v1::FabricDescription& description,
+                   const std::vector<core::Digest>& inputs, const fabric::Tile& tile) {
+  const v1::Precompute& settings = description.precompute();
+  Stage stage = make_stage(StageName::kShadow, 0, inputs);
+  v1::ShadowSpec& spec = *stage.spec.mutable_shadow();
+  spec.set_paths(shadow_paths(settings.quality()));
+  spec.set_paths_per_shard(kShadowPathsPerShard);
+  for (const std::string& name : tile.material_names) {
+    *spec.add_materials() = optics_of(description, name);
+  }
+  spec.set_seed(seed_for(description, Purpose::kShadow));
+  spec.set_max_path_length(expanded(settings.max_path_length(), "max_path_length"));
+  spec.set_bins(kShadowBins);
+  spec.set_bin_mfp(kShadowBinMfp);
+  stage.shard_count = ceil_div(spec.paths(), spec.paths_per_shard());
+  return stage;
+}
+
 // Paths are numbered within their cell, so a shard is named by its cell and its paths: raising
 // paths_per_cell leaves the digests of all full blocks as they are.
 void name_transfer_shard(core::Hasher& hasher, const Stage& stage, std::uint64_t shard) {
@@ -231,13 +266,15 @@ const char* to_string(StageName name) {
       return "coefficients";
     case StageName::kTransfer:
       return "transfer";
+    case StageName::kShadow:
+      return "shadow";
   }
   return "unknown";
 }
 
 std::vector<StageName> all_stages() {
-  return {StageName::kGeometry, StageName::kGrid,         StageName::kVisibility,
-          StageName::kBasis,    StageName::kCoefficients, StageName::kTransfer};
+  return {StageName::kGeometry,     StageName::kGrid,     StageName::kVisibility, StageName::kBasis,
+          StageName::kCoefficients, StageName::kTransfer, StageName::kShadow};
 }
 
 std::vector<std::uint64_t> basis_sample(const v1::FabricDescription& description,
@@ -300,7 +337,8 @@ std::vector<Stage> plan(const v1::FabricDescription& description,
   const StageResults* const basis = find(finished, StageName::kBasis);
   const bool transfer_next = grid != nullptr && find(finished, StageName::kTransfer) == nullptr;
   fabric::Tile tile;
-  if (visibility == nullptr || transfer_next) {
+  const bool shadow_next = grid != nullptr && find(finished, StageName::kShadow) == nullptr;
+  if (visibility == nullptr || transfer_next || shadow_next) {
     tile = fabric::decode_tile(read_blob(tile_digest));
   }
 
@@ -319,6 +357,9 @@ std::vector<Stage> plan(const v1::FabricDescription& description,
     const core::Digest& grid_digest = only_shard(*grid);
     stages.push_back(
         transfer_stage(description, {tile_digest, grid_digest}, tile, read_blob(grid_digest)));
+  }
+  if (shadow_next) {
+    stages.push_back(shadow_stage(description, {tile_digest, only_shard(*grid)}, tile));
   }
   return stages;
 }

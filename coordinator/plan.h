@@ -12,7 +12,7 @@
 
 namespace weft::coordinator {
 
-enum class StageName { kGeometry, kGrid, kVisibility, kBasis, kCoefficients, kTransfer };
+enum class StageName { kGeometry, kGrid, kVisibility, kBasis, kCoefficients, kTransfer, kShadow };
 [[nodiscard]] const char* to_string(StageName name);
 
 // One stage of a job, ready to run: everything its shards read is known.

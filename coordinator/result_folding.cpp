@@ -9,6 +9,7 @@
 #include "core/stopping.h"
 #include "fabric/tile.h"
 #include "proto/arrays.h"
+#include "shading/shadow_fit.h"
 
 namespace weft::coordinator {
 
@@ -248,6 +249,34 @@ void fold_coefficients(const FinishedStage& coefficients,
   }
   database.ssdf_sign_error =
       compared == 0 ? 0 : static_cast<double>(wrong) / static_cast<double>(compared);
+}
+
+double fold_shadow(const FinishedStage& shadow, const ReadBlob& read_blob,
+                   storage::FabricDatabase& database) {
+  constexpr double kUnlitSigmaMfp = 2;
+  const v1::ShadowSpec& spec = shadow.stage.spec.shadow();
+  std::vector<double> light(std::size_t{spec.bins()} + 1, 0.0);
+  for (std::uint64_t shard = 0; shard < shadow.shards.size(); ++shard) {
+    const ShardResult result(shadow, shard, read_blob);
+    const std::uint64_t planned = std::min<std::uint64_t>(
+        spec.paths_per_shard(), spec.paths() - shard * spec.paths_per_shard());
+    result.require(result.array<std::uint64_t>("paths", {1})[0] == planned,
+                   "it has not the paths that were planned");
+    const auto sum = result.array<std::int64_t>("sum", {light.size()});
+    result.require(std::all_of(sum.begin(), sum.end(), [](auto s) { return s >= 0; }),
+                   "a sum of light is negative");
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      light[i] += core::from_fixed_point(sum[i]);
+    }
+  }
+  const double bin_mm = spec.bin_mfp() * static_cast<double>(database.mean_free_path_mm);
+  if (!std::any_of(light.begin(), light.end() - 1, [](double part) { return part > 0; })) {
+    database.sigma_shadow_mm = static_cast<float>(kUnlitSigmaMfp / spec.bin_mfp() * bin_mm);
+    return 0;
+  }
+  const shading::ShadowFit fit = shading::fit_shadow(light);
+  database.sigma_shadow_mm = static_cast<float>(fit.sigma * bin_mm);
+  return fit.error;
 }
 
 void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,

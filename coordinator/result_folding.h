@@ -35,6 +35,10 @@ void fold_basis(const FinishedStage& basis, const ReadBlob& read_blob,
 void fold_coefficients(const FinishedStage& coefficients,
                        const std::vector<std::uint64_t>& basis_shards, const ReadBlob& read_blob,
                        storage::FabricDatabase& database);
+// Fits the filter of shadows; with no light in the bins it is two mean free paths, which nothing
+// reads. Returns what the fit gets wrong (shading/shadow_fit.h). REQUIRES: the grid is folded.
+double fold_shadow(const FinishedStage& shadow, const ReadBlob& read_blob,
+                   storage::FabricDatabase& database);
 // REQUIRES: the grid is folded.
 void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,
                    storage::FabricDatabase& database);

@@ -157,6 +157,21 @@ v1::Arrays transfer_result(std::uint64_t cell, std::uint64_t first, std::uint64_
   return arrays;
 }
 
+// Light that falls off as the normal distribution of 24 bins does.
+v1::Arrays shadow_result(const Stage& stage, std::uint64_t shard) {
+  const v1::ShadowSpec& spec = stage.spec.shadow();
+  std::vector<std::int64_t> sum;
+  for (std::uint32_t i = 0; i <= spec.bins(); ++i) {
+    const double upper = i < spec.bins() ? std::erf((i + 1) / (24 * std::sqrt(2.0))) : 1;
+    const double lower = std::erf(i / (24 * std::sqrt(2.0)));
+    sum.push_back(core::to_fixed_point(static_cast<double>(1 + shard) * (upper - lower)));
+  }
+  v1::Arrays arrays;
+  add<std::uint64_t>(arrays, "paths", {1}, {spec.paths_per_shard()});
+  add(arrays, "sum", {sum.size()}, sum);
+  return arrays;
+}
+
 v1::Arrays result_of(const Stage& stage, std::uint64_t shard) {
   v1::Arrays arrays;
   switch (stage.name) {
@@ -181,6 +196,8 @@ v1::Arrays result_of(const Stage& stage, std::uint64_t shard) {
           std::min<std::uint64_t>(stage.spec.transfer().paths_per_shard(), kPathsPerCell - first);
       return transfer_result(shard / blocks, first, count);
     }
+    case StageName::kShadow:
+      return shadow_result(stage, shard);
   }
   return arrays;
 }
@@ -440,7 +457,9 @@ TEST_F(CommitTest, FileSaysWhatItWasMadeFrom) {
   EXPECT_THAT(db.stages_json, HasSubstr("\"results_sha256\""));
   EXPECT_EQ(db.materials[0].c_r.y, 0.25F);
   EXPECT_NEAR(db.materials[0].beta_tt, 0.34906585, 1e-6);
-  EXPECT_EQ(db.sigma_shadow_mm, 0.25F);
+  // 24 bins of a 16th of the mean free path.
+  EXPECT_NEAR(db.sigma_shadow_mm, 24.0 / 16 * 0.125, 1e-5);
+  EXPECT_THAT(db.stages_json, HasSubstr("\"fit_error\""));
 }
 
 TEST_F(CommitTest, MalformedResultsAreRefusedNamingStageAndShard) {
@@ -453,6 +472,7 @@ TEST_F(CommitTest, MalformedResultsAreRefusedNamingStageAndShard) {
               testing::AllOf(HasSubstr("stage coefficients, shard 2"), HasSubstr("missing")));
   EXPECT_THAT(refusal(StageName::kCoefficients, 2, coefficients_result(0, 2)),
               testing::AllOf(HasSubstr("stage coefficients, shard 2"), HasSubstr("has shape")));
+  EXPECT_THAT(refusal(StageName::kShadow, 1, v1::Arrays()), HasSubstr("stage shadow, shard 1"));
   EXPECT_THAT(refusal(StageName::kBasis, 0, grid_result()), HasSubstr("stage basis, shard 0"));
 
   v1::Arrays wrong = coefficients_result(1, 3);

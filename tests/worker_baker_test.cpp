@@ -92,6 +92,60 @@ BakerContext transfer_context(v1::TransferEstimator estimator = v1::TRANSFER_EST
   return context;
 }
 
+BakerContext shadow_context(std::uint32_t paths_per_shard) {
+  BakerContext context = transfer_context();
+  const v1::Material material = context.spec.transfer().materials(0);
+  v1::ShadowSpec& spec = *context.spec.mutable_shadow();
+  spec.set_paths(1000);
+  spec.set_paths_per_shard(paths_per_shard);
+  *spec.add_materials() = material;
+  spec.set_seed(6);
+  spec.set_max_path_length(100);
+  spec.set_bins(32);
+  spec.set_bin_mfp(0.125);
+  context.shard_count = (1000 + paths_per_shard - 1) / paths_per_shard;
+  return context;
+}
+
+std::vector<std::int64_t> shadow_sums(std::uint32_t paths_per_shard) {
+  const BakerContext context = shadow_context(paths_per_shard);
+  const auto baker = make_baker(context);
+  std::vector<std::int64_t> sums(33, 0);
+  std::uint64_t paths = 0;
+  for (std::uint64_t shard = 0; shard < context.shard_count; ++shard) {
+    const v1::Arrays arrays = v1::parse_arrays(baker->bake(shard, {}, never));
+    const auto part = v1::array_of<std::int64_t>(arrays, "sum");
+    paths += v1::array_of<std::uint64_t>(arrays, "paths")[0];
+    EXPECT_EQ(part.size(), sums.size());
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      sums[i] += part[i];
+    }
+  }
+  EXPECT_EQ(paths, 1000U);
+  return sums;
+}
+
+TEST(ShadowBaker, ShardsOfAnySizeGiveTheSameSums) {
+  const std::vector<std::int64_t> whole = shadow_sums(1000);
+  EXPECT_GT(std::accumulate(whole.begin(), whole.end(), std::int64_t{0}), 0);
+  EXPECT_EQ(shadow_sums(300), whole);
+  EXPECT_EQ(shadow_sums(1), whole);
+}
+
+TEST(ShadowBaker, RefusesWhatMakesNoSense) {
+  for (const auto& spoil : std::vector<void (*)(v1::ShadowSpec&)>{
+           [](v1::ShadowSpec& spec) { spec.set_bins(0); },
+           [](v1::ShadowSpec& spec) { spec.set_bin_mfp(-1); },
+           [](v1::ShadowSpec& spec) { spec.set_paths(0); },
+           [](v1::ShadowSpec& spec) { spec.set_paths_per_shard(0); },
+           [](v1::ShadowSpec& spec) { spec.clear_materials(); },
+           [](v1::ShadowSpec& spec) { spec.set_paths(1001); }}) {
+    BakerContext context = shadow_context(1000);
+    spoil(*context.spec.mutable_shadow());
+    EXPECT_THROW(static_cast<void>(make_baker(context)), core::Error);
+  }
+}
+
 TEST(WorkerBaker, Geometry_IsTheTileOfItsDescription) {
   BakerContext context;
   *context.spec.mutable_geometry()->mutable_description() =

@@ -27,6 +27,7 @@ bool Path::advance() {
   if (!hit) {
     return false;
   }
+  travelled_mm_ += static_cast<double>(hit->t_mm) * glm::dvec2(direction_);
   const fabric::Tile& tile = scene_.tile();
   const glm::ivec2 from = scene_.tile_of(position_mm_);
   const glm::vec3 reached = position_mm_ + hit->t_mm * direction_;

@@ -5,6 +5,7 @@
 #include <span>
 
 #include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include "core/random.h"
@@ -38,6 +39,9 @@ class Path {
   [[nodiscard]] glm::vec3 direction() const { return direction_; }
   [[nodiscard]] glm::vec3 throughput() const { return throughput_; }
   [[nodiscard]] std::uint32_t vertices() const { return vertices_; }
+  // Across and along the cloth, from the start to the last fibre met; and that one's height.
+  [[nodiscard]] glm::dvec2 travelled_mm() const { return travelled_mm_; }
+  [[nodiscard]] double height_mm() const { return static_cast<double>(position_mm_.z); }
 
  private:
   const Scene& scene_;
@@ -45,6 +49,7 @@ class Path {
   glm::vec3 position_mm_{0, 0, 0};
   glm::vec3 direction_;
   StrandCopy own_;  // relative to the tile that holds position_mm_
+  glm::dvec2 travelled_mm_{0, 0};
   glm::vec3 throughput_{1, 1, 1};
   std::uint32_t vertices_ = 0;
   glm::mat3 frame_{1};  // of the fibre just met

@@ -24,6 +24,8 @@ std::unique_ptr<Baker> make_baker_of_kind(const BakerContext& context) {
       return make_coefficients_baker(context);
     case v1::TaskSpec::kTransfer:
       return make_transfer_baker(context);
+    case v1::TaskSpec::kShadow:
+      return make_shadow_baker(context);
     case v1::TaskSpec::KIND_NOT_SET:
       break;
   }

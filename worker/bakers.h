@@ -20,6 +20,7 @@ namespace weft::worker {
 [[nodiscard]] std::unique_ptr<Baker> make_basis_baker(const BakerContext& context);
 [[nodiscard]] std::unique_ptr<Baker> make_coefficients_baker(const BakerContext& context);
 [[nodiscard]] std::unique_ptr<Baker> make_transfer_baker(const BakerContext& context);
+[[nodiscard]] std::unique_ptr<Baker> make_shadow_baker(const BakerContext& context);
 
 // The tile that most stages read, and its rays.
 struct TileScene {

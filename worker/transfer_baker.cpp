@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <numbers>
 #include <span>
 #include <vector>
 
@@ -11,26 +10,11 @@
 #include "transport/stopping.h"
 #include "transport/transfer.h"
 #include "worker/bakers.h"
+#include "worker/materials.h"
 
 namespace weft::worker {
 
 namespace {
-
-shading::FibreMaterial fibre_material(const v1::Material& material) {
-  const auto colour = [](const v1::Rgb& rgb) {
-    require(rgb.r() >= 0 && rgb.r() <= 1 && rgb.g() >= 0 && rgb.g() <= 1 && rgb.b() >= 0 &&
-                rgb.b() <= 1,
-            "transfer", "a material's colours must be between 0 and 1");
-    return glm::vec3(rgb.r(), rgb.g(), rgb.b());
-  };
-  const auto width = [](double degrees) {
-    require(degrees >= 0.1 && degrees <= 180, "transfer",
-            "a material's widths must be between 0.1 and 180 degrees");
-    return static_cast<float>(degrees * std::numbers::pi / 180);
-  };
-  return {colour(material.c_r()), colour(material.c_tt()), width(material.beta_r_deg()),
-          width(material.beta_tt_deg()), width(material.gamma_tt_deg())};
-}
 
 class TransferBaker : public Baker {
  public:
@@ -51,11 +35,7 @@ class TransferBaker : public Baker {
                 spec_.estimator() == v1::TRANSFER_ESTIMATOR_LIGHT,
             "transfer", "the estimator must be EXIT or LIGHT");
     input_ = std::make_unique<TileScene>(context.inputs[0]);
-    require(static_cast<std::size_t>(spec_.materials_size()) == input_->tile.material_names.size(),
-            "transfer", "there must be one material for each of the tile's");
-    for (const v1::Material& material : spec_.materials()) {
-      materials_.emplace_back(fibre_material(material));
-    }
+    materials_ = bcsdfs_of(spec_.materials(), input_->tile, "transfer");
     read_cells(context.inputs[1]);
     blocks_per_cell_ = (std::uint64_t{spec_.paths_per_cell()} + spec_.paths_per_shard() - 1) /
                        spec_.paths_per_shard();
