@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cli/client.h"
-#include "client/fetch_version.h"
+#include "client/fabric_cache.h"
 #include "core/error.h"
 
 namespace weft::cli {
@@ -23,38 +23,6 @@ bool is_name(std::string_view text) {
   return !text.empty() && text.size() <= kNameLimit && is_plain(text.front()) &&
          std::all_of(text.begin(), text.end(),
                      [&](char c) { return is_plain(c) || c == '_' || c == '-'; });
-}
-
-// Removes the databases that were fetched longest ago until the cache keeps its limit. `kept`
-// stays.
-void trim_cache(const std::filesystem::path& folder, const std::filesystem::path& kept) {
-  struct Entry {
-    std::filesystem::file_time_type fetched_at;
-    std::filesystem::path path;
-    std::uint64_t size_bytes;
-  };
-  std::vector<Entry> entries;
-  std::uint64_t total_bytes = 0;
-  std::error_code failure;
-  for (const auto& item : std::filesystem::directory_iterator(folder, failure)) {
-    std::error_code gone;  // another process may trim at the same time
-    const std::uint64_t size_bytes = item.file_size(gone);
-    const auto fetched_at = item.last_write_time(gone);
-    if (!gone && item.path() != kept) {
-      entries.push_back({fetched_at, item.path(), size_bytes});
-      total_bytes += size_bytes;
-    }
-  }
-  std::sort(entries.begin(), entries.end(),
-            [](const Entry& a, const Entry& b) { return a.fetched_at < b.fetched_at; });
-  for (const Entry& entry : entries) {
-    if (total_bytes <= kCacheLimitBytes) {
-      return;
-    }
-    std::error_code gone;
-    std::filesystem::remove(entry.path, gone);
-    total_bytes -= entry.size_bytes;
-  }
 }
 
 // $XDG_CACHE_HOME/weft, else ~/.cache/weft; empty when neither is set.
@@ -125,18 +93,8 @@ std::filesystem::path resolve_fabric(const std::string& reference, const std::st
   }
   Client connection(coordinator);
   const v1::Version version = client::find_version(connection, reference);
-  const std::filesystem::path folder = fabric_cache_folder();
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot make the folder " + folder.string() + ": " + failure.message() +
-                          "; set XDG_CACHE_HOME to one that can be written");
-  }
-  std::filesystem::path path = folder / (client::version_digest(version).hex() + ".h5");
-  client::fetch_version(connection, version, path, nullptr);
-  trim_cache(folder, path);
-  return path;
+  const client::FabricCache cache(fabric_cache_folder(), kCacheLimitBytes);
+  return cache.fetch(connection, version, nullptr);
 }
 
 }  // namespace weft::cli

@@ -1,6 +1,8 @@
 #include "cli/picture_files.h"
 
 #include <cstdio>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -75,7 +77,9 @@ bool PictureFiles::start(const render::Frame& frame) {
     }
   }
   WrittenPicture written = written_picture(frame);
-  if (options_.resume &&
+  std::error_code failure;
+  const bool is_shown = written.png.empty() || std::filesystem::exists(written.png, failure);
+  if (options_.resume && is_shown &&
       is_drawn_from(written.out, recipe(frame, frame.scene.picture().samples_per_pixel()))) {
     written.was_there = true;
     written_.push_back(written);

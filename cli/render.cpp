@@ -1,9 +1,11 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "cli/add_command.h"
 #include "cli/commands.h"
@@ -11,12 +13,16 @@
 #include "cli/fabric_shelf.h"
 #include "cli/list_devices.h"
 #include "cli/picture_files.h"
+#include "cli/progress.h"
 #include "cli/render_options.h"
 #include "cli/render_report.h"
+#include "core/digest.h"
 #include "core/error.h"
 #include "core/interrupt.h"
+#include "render/animation.h"
 #include "render/draw_pictures.h"
 #include "render/make_integrator.h"
+#include "render/node/node_client.h"
 
 namespace weft::cli {
 
@@ -31,6 +37,8 @@ constexpr const char* kHelp =
     "  weft render silk.h5 -o silk.exr --png silk.png\n"
     "  weft render silk@3 --scene drape.textproto --size 1024x768 --spp 256 -o drape.exr\n"
     "  weft render silk.h5 --integrator path --local -o reference.exr --json\n"
+    "  weft render silk@3 --node 127.0.0.1:7412 --scene drape.textproto -o drape.exr\n"
+    "  weft render --again drape.exr -o same.exr\n"
     "  weft render --list-devices";
 
 // Pictures drawn again from headers: a fabric may have changed under its name.
@@ -55,6 +63,44 @@ void draw_here(const RenderOptions& options, const v1::Scene& scene,
       render::files_on_disk(), files, should_stop);
 }
 
+// What a node says before it draws, on a terminal only.
+render::NodeReports node_reports() {
+  if (isatty(fileno(stderr)) != 1) {
+    return {};
+  }
+  return {[](std::uint32_t ahead) {
+            if (ahead > 0) {
+              fmt::print(stderr, "\r\x1b[Kwaiting; {} ahead", ahead);
+            }
+          },
+          [](const v1::RenderFetching& fetching) {
+            fmt::print(stderr, "\r\x1b[Kthe node fetches {}: {} of {}", fetching.fabric(),
+                       format_bytes(fetching.bytes_here()), format_bytes(fetching.bytes_total()));
+          }};
+}
+
+FabricIdentities identities_of(const render::NodeClient& node) {
+  FabricIdentities identities;
+  for (const auto& [reference, fabric] : node.fabrics()) {
+    const auto digest = core::Digest::from_binary(fabric.content_digest());
+    identities[reference] = {fabric.name(), digest ? digest->hex() : std::string()};
+  }
+  return identities;
+}
+
+// A node opens no path of ours.
+void check_published(const v1::Scene& scene) {
+  for (const std::string& reference : render::fabrics_of(scene)) {
+    if (!parse_reference(reference)) {
+      throw core::Error(core::Code::kInvalidArgument,
+                        reference +
+                            ": a render node draws published fabrics only, such as silk or "
+                            "silk@3; publish it with 'weft submit', or draw it without "
+                            "--node");
+    }
+  }
+}
+
 void run(RenderOptions options) {
   if (options.fabric.empty() && options.again.empty()) {
     throw CLI::RequiredError("fabric");
@@ -65,10 +111,21 @@ void run(RenderOptions options) {
                     render::reads_transfer(scene.integration().integrator())
                         ? render::Fabric::Wanted::kFibresAndTransfer
                         : render::Fabric::Wanted::kFibres);
-  PictureFiles files(options, scene, [&] { return shelf.identities(); });
+  std::optional<render::NodeClient> node;
+  if (!options.node.empty()) {
+    check_published(scene);
+    node.emplace(options.node);
+  }
+  const auto identities = [&] { return node ? identities_of(*node) : shelf.identities(); };
+  const auto should_stop = [&] { return interrupt.requested(); };
+  PictureFiles files(options, scene, identities);
   try {
-    draw_here(
-        options, scene, [&] { return interrupt.requested(); }, shelf, files);
+    if (node) {
+      node->draw_pictures(scene, options.progressive, render::files_on_disk(), files,
+                          node_reports(), should_stop);
+    } else {
+      draw_here(options, scene, should_stop, shelf, files);
+    }
   } catch (const core::Error& error) {
     if (error.code() != core::Code::kCancelled) {
       throw;
@@ -76,7 +133,7 @@ void run(RenderOptions options) {
     throw core::Error(core::Code::kCancelled, "stopped; " + files.what_is_kept());
   }
   if (!options.again.empty()) {
-    warn_of_changed_fabrics(options.again, shelf.identities());
+    warn_of_changed_fabrics(options.again, identities());
   }
   report_pictures(options, scene, files.written());
 }

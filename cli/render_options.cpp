@@ -10,6 +10,7 @@
 #include "cli/client.h"
 #include "cli/picture_metadata.h"
 #include "core/error.h"
+#include "proto/address.h"
 #include "render/environment_fit.h"
 #include "render/image.h"
 #include "render/layers.h"
@@ -129,8 +130,15 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
       ->excludes(scene);
   command.add_flag("--progressive", options.progressive,
                    "Refine the files pass by pass; Ctrl-C keeps the last whole pass");
-  command.add_flag("--resume", options.resume,
-                   "Skip pictures that are on disk already, drawn from the same scene");
+  auto* resume =
+      command.add_flag("--resume", options.resume,
+                       "Skip pictures that are on disk already, drawn from the same scene");
+  command
+      .add_option("--node", options.node,
+                  "Let a render node draw: host:port or unix:/path; default: in process")
+      ->envname("WEFT_RENDER_NODE")
+      ->check(CLI::Validator(v1::mistake_in_address, "", "address"))
+      ->excludes(resume);
   command
       .add_option("--integrator", options.integrator,
                   "path: every fibre, all bounces; precomputed: the database's transfer; dual: "

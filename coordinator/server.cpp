@@ -8,6 +8,7 @@
 #include "coordinator/job_service.h"
 #include "coordinator/worker_service.h"
 #include "core/error.h"
+#include "proto/address.h"
 #include "proto/limits.h"
 
 namespace weft::coordinator {
@@ -16,11 +17,6 @@ namespace {
 
 constexpr int kThreadsLimit = 512;  // each waiting worker and watcher holds one
 constexpr auto kGrace = std::chrono::seconds(2);
-
-bool is_local(const std::string& listen) {
-  const auto starts = [&](const char* beginning) { return listen.starts_with(beginning); };
-  return starts("unix:") || starts("127.") || starts("localhost:") || starts("[::1]:");
-}
 
 }  // namespace
 
@@ -39,7 +35,7 @@ struct Server::Services {
 
 Server::Server(Scheduler& scheduler, const std::string& listen, bool insecure)
     : services_(std::make_unique<Services>(scheduler)), address_(listen) {
-  if (!insecure && !is_local(listen)) {
+  if (!insecure && !v1::is_local_address(listen)) {
     throw core::Error(core::Code::kPermissionDenied,
                       listen +
                           " can be reached from other machines, and calls are neither "

@@ -23,4 +23,9 @@ std::string mistake_in_address(const std::string& address) {
   return "";
 }
 
+bool is_local_address(const std::string& address) {
+  return address.starts_with("unix:") || address.starts_with("127.") ||
+         address.starts_with("localhost:") || address.starts_with("[::1]:");
+}
+
 }  // namespace weft::v1

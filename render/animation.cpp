@@ -207,4 +207,16 @@ std::vector<std::string> files_of(const v1::Scene& scene) {
   return {files.begin(), files.end()};
 }
 
+std::vector<std::string> fabrics_of(const v1::Scene& scene) {
+  std::set<std::string> fabrics;
+  for (const v1::Cloth& cloth : scene.cloths()) {
+    if (cloth.has_pattern()) {
+      fabrics.insert(cloth.pattern().fabrics().begin(), cloth.pattern().fabrics().end());
+    } else {
+      fabrics.insert(cloth.fabric());
+    }
+  }
+  return {fabrics.begin(), fabrics.end()};
+}
+
 }  // namespace weft::render

@@ -29,4 +29,7 @@ inline constexpr std::uint32_t kFrameLimit = 10'000;
 // The files that the scene names, of all its frames, each once.
 [[nodiscard]] std::vector<std::string> files_of(const v1::Scene& scene);
 
+// The fabrics that the scene names, each once; an empty name is one of them.
+[[nodiscard]] std::vector<std::string> fabrics_of(const v1::Scene& scene);
+
 }  // namespace weft::render

@@ -49,21 +49,27 @@ TEST(WrongUse, WithoutACoordinatorEveryCommandExitsWithFiveAndSaysHowToStartOne)
 }
 
 TEST(WrongUse, ACommandLineThatIsWrongExitsWithTwo) {
-  expect_refused({{{"run"}, 2, "fabric is required"},
-                  {{"run", "x.textproto", "-o", "x.h5", "--threads", "0"}, 2, "--threads"},
-                  {{"run", "x.textproto", "-o", "x.h5", "--quality", "good"}, 2, "--quality"},
-                  {{"up", "--workers", "0"}, 2, "--workers"},
-                  {{"submit"}, 2, "fabric is required"},
-                  {{"submit", "x.textproto", "-o", "x.h5"}, 2, "--wait"},
-                  {{"jobs", "--limit", "0"}, 2, "--limit"},
-                  {{"jobs", "--coordinator", "nowhere"}, 2, "host:port"},
-                  {{"jobs", "--coordinator", "127.0.0.1:99999"}, 2, "host:port"},
-                  {{"watch"}, 2, "job is required"},
-                  {{"cancel"}, 2, "job is required"},
-                  {{"workers", "--frob"}, 2, "--frob"},
-                  {{"fabrics", "silk"}, 2, "silk"},
-                  {{"versions"}, 2, "fabric is required"},
-                  {{"fetch", "Silk@3"}, 2, "NAME@NUMBER"}});
+  expect_refused(
+      {{{"run"}, 2, "fabric is required"},
+       {{"run", "x.textproto", "-o", "x.h5", "--threads", "0"}, 2, "--threads"},
+       {{"run", "x.textproto", "-o", "x.h5", "--quality", "good"}, 2, "--quality"},
+       {{"up", "--workers", "0"}, 2, "--workers"},
+       {{"submit"}, 2, "fabric is required"},
+       {{"submit", "x.textproto", "-o", "x.h5"}, 2, "--wait"},
+       {{"jobs", "--limit", "0"}, 2, "--limit"},
+       {{"jobs", "--coordinator", "nowhere"}, 2, "host:port"},
+       {{"jobs", "--coordinator", "127.0.0.1:99999"}, 2, "host:port"},
+       {{"watch"}, 2, "job is required"},
+       {{"cancel"}, 2, "job is required"},
+       {{"workers", "--frob"}, 2, "--frob"},
+       {{"fabrics", "silk"}, 2, "silk"},
+       {{"versions"}, 2, "fabric is required"},
+       {{"fetch", "Silk@3"}, 2, "NAME@NUMBER"},
+       {{"render", "-o", "x.exr"}, 2, "fabric is required"},
+       {{"render", "silk", "-o", "x.exr", "--layers", "shade"}, 2, "single,multiple"},
+       {{"render", "silk", "-o", "x.exr", "--node", "nowhere"}, 2, "host:port"},
+       {{"render", "silk", "-o", "x.exr", "--node", "127.0.0.1:1", "--resume"}, 2, "--resume"},
+       {{"render", "--again", "a.exr", "--scene", "b", "-o", "x.exr"}, 2, "--scene"}});
 }
 
 TEST(WrongUse, FilesThatAreNotThereOrCannotBeWrittenAreNamed) {
@@ -74,6 +80,12 @@ TEST(WrongUse, FilesThatAreNotThereOrCannotBeWrittenAreNamed) {
                   {{"run", tiny, "-o", "/no/such/folder/x.h5"}, 3, "/no/such/folder"},
                   {{"run", tiny, "-o", "/tmp"}, 1, "is a folder"},
                   {{"run", tiny, "-o", "/proc/x.h5"}, 5, "/proc"}});
+}
+
+TEST(WrongUse, ARenderNodeThatIsNotThereOrCannotDrawAFileIsToldApart) {
+  expect_refused({{{"render", "silk", "-o", "x.exr", "--node", "127.0.0.1:1"}, 5, "weft-render"},
+                  {{"render", "./silk.h5", "-o", "x.exr", "--node", "127.0.0.1:1"}, 1, "published"},
+                  {{"render", "--again", "no_such.exr", "-o", "x.exr"}, 3, "no_such.exr"}});
 }
 
 TEST(WrongUse, AnUnknownNameExitsWithThreeAndSaysWhatThereIs) {

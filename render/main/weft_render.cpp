@@ -1,0 +1,153 @@
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <exception>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include "core/clock.h"
+#include "core/error.h"
+#include "proto/address.h"
+#include "render/node/render_node.h"
+
+namespace {
+
+namespace core = weft::core;
+namespace render = weft::render;
+
+struct Options {
+  render::RenderNodeOptions node;
+  std::string listen = "127.0.0.1:7412";
+  std::string log_level = "info";
+  double cache_gib = 16;
+  double memory_gib = 0;
+  double drain_seconds = 60;
+  bool insecure = false;
+};
+
+constexpr double kGib = 1024.0 * 1024 * 1024;
+
+// Blocks SIGTERM and SIGINT in this thread and all that it starts; they are waited for.
+sigset_t block_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+std::string default_cache() {
+  // No other thread changes the environment: weft never does.
+  const char* cache = std::getenv("XDG_CACHE_HOME");  // NOLINT(concurrency-mt-unsafe)
+  if (cache != nullptr && *cache == '/') {
+    return std::string(cache) + "/weft";
+  }
+  const char* home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe)
+  return home != nullptr && *home != '\0' ? std::string(home) + "/.cache/weft" : "weft-cache";
+}
+
+// Three quarters of the machine's.
+double default_memory_gib() {
+  const auto pages = static_cast<double>(sysconf(_SC_PHYS_PAGES));
+  return 0.75 * pages * static_cast<double>(sysconf(_SC_PAGE_SIZE)) / kGib;
+}
+
+int serve(Options options) {
+  const sigset_t signals = block_signals();
+  options.node.cache_limit_bytes = static_cast<std::uint64_t>(options.cache_gib * kGib);
+  options.node.memory_limit_bytes = static_cast<std::uint64_t>(options.memory_gib * kGib);
+  render::RenderNode node(options.node, options.listen, options.insecure);
+  std::printf("weft-render ready at %s\n", node.address().c_str());
+  std::fflush(stdout);
+  int signal = 0;
+  sigwait(&signals, &signal);
+  spdlog::info("event=draining signal={}", signal);
+  const core::Stopwatch since_signal;
+  node.drain([&] {
+    const timespec at_once{};
+    return since_signal.seconds() > options.drain_seconds ||
+           sigtimedwait(&signals, nullptr, &at_once) > 0;
+  });
+  spdlog::info("event=stopping");
+  return 0;
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("--listen", options.listen,
+                 "HOST:PORT (port 0: any free one) or unix:PATH; printed when ready")
+      ->capture_default_str();
+  app.add_flag("--insecure", options.insecure,
+               "allow an address that other machines reach, though nothing is encrypted");
+  app.add_option("--coordinator", options.node.coordinator,
+                 "where fabrics come from: host:port or unix:/path")
+      ->envname("WEFT_COORDINATOR")
+      ->check(CLI::Validator(weft::v1::mistake_in_address, "", "address"))
+      ->capture_default_str();
+  app.add_option("--cache", options.node.cache, "folder of fetched fabrics; made when absent")
+      ->capture_default_str();
+  app.add_option("--cache-limit", options.cache_gib,
+                 "GiB of fetched fabrics; those used longest ago go first")
+      ->check(CLI::Range(0.001, 1e6))
+      ->capture_default_str();
+  app.add_option("--memory-limit", options.memory_gib,
+                 "GiB of fabrics and pictures in memory; what does not fit is refused")
+      ->check(CLI::Range(0.001, 1e6))
+      ->default_str("three quarters of the machine's");
+  app.add_option("--orders", options.node.orders_limit, "orders being drawn and waiting, at most")
+      ->check(CLI::Range(1U, 64U))
+      ->capture_default_str();
+  app.add_option("--threads", options.node.threads, "threads; default: all the machine has")
+      ->check(CLI::Range(1U, 1024U));
+  app.add_option("--drain", options.drain_seconds,
+                 "seconds that orders get to finish after SIGTERM")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  app.add_option("--log-level", options.log_level, "what is logged to stderr")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error"}))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.node.coordinator = "127.0.0.1:7411";
+  options.node.cache = default_cache();
+  options.memory_gib = default_memory_gib();
+  CLI::App app{
+      "weft-render draws scenes for 'weft render --node' and others: it fetches the fabrics that "
+      "they name from a coordinator and keeps them between pictures."};
+  app.name("weft-render");
+  add_options(app, options);
+  app.set_version_flag("--version", "weft-render 0.1.0");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  spdlog::set_default_logger(spdlog::stderr_color_mt("render"));
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
+  spdlog::set_level(spdlog::level::from_str(options.log_level));
+  try {
+    return serve(options);
+  } catch (const core::Error& error) {
+    std::fprintf(stderr, "weft-render: %s\n", error.what());
+    switch (error.code()) {
+      case core::Code::kPermissionDenied:
+        return 4;
+      case core::Code::kUnavailable:
+        return 5;
+      default:
+        return 1;
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "weft-render: internal error: %s\n", error.what());
+    return 1;
+  }
+}
