@@ -30,8 +30,8 @@ namespace weft::bench {
 namespace {
 
 constexpr std::array<double, 9> kSharpness = {5, 10, 20, 50, 100, 150, 200, 400, 1000};
-constexpr int kSegments = 60;   // seen from each view
-constexpr int kSamples = 192;   // of the BCSDF, and of each light
+constexpr int kSegments = 60;  // seen from each view
+constexpr int kSamples = 192;  // of the BCSDF, and of each light
 constexpr std::uint32_t kResolution = 128;
 constexpr double kRadians = render::kPi / 180;
 
@@ -41,10 +41,18 @@ struct Gaussians {
 };
 constexpr std::array<Gaussians, 7> kSums = {
     {{24, 64}, {48, 32}, {48, 64}, {48, 128}, {96, 64}, {96, 128}, {192, 128}}};
+// Sums and signed distances blended between two sharpnesses; the last is the paper's.
+struct Blend {
+  std::size_t sum;  // of kSums
+  float low;
+  float high;
+};
+constexpr std::array<Blend, 4> kBlends = {{{2, 20, 50}, {2, 20, 80}, {2, 50, 100}, {3, 100, 200}}};
 constexpr std::size_t kDistances = 2;  // by the database's components, and without loss
 
 // What one segment sends to the eye under one light, by each representation and by rays.
 struct Sent {
+  float sharpness = 0;
   double reference = 0;
   std::array<double, kSums.size()> by_sum{};
   std::array<double, kDistances> by_distance{};
@@ -209,6 +217,7 @@ std::vector<std::vector<Sent>> measure(const render::Fabric& fabric) {
         for (const glm::vec3& axis : light_directions()) {
           const shading::SphericalGaussian light{axis, static_cast<float>(kSharpness[s])};
           Sent one;
+          one.sharpness = light.sharpness;
           one.reference = by_rays(seen, by_fibre, light, random);
           for (std::size_t k = 0; k < kSums.size(); ++k) {
             one.by_sum[k] = seen.by_sum(k, light);
@@ -258,6 +267,18 @@ void print_fabric(const std::string& name, const std::vector<std::vector<Sent>>&
   }
   print_row("SSDF", [](const Sent& one) { return one.by_distance[0]; });
   print_row("SSDF, not projected", [](const Sent& one) { return one.by_distance[1]; });
+  for (const Blend& blend : kBlends) {
+    const Gaussians& sum = kSums[blend.sum];
+    std::array<char, 48> name_of_blend{};
+    std::snprintf(name_of_blend.data(), name_of_blend.size(), "blend of %u, %g in [%g, %g]",
+                  sum.count, sum.sharpness, static_cast<double>(blend.low),
+                  static_cast<double>(blend.high));
+    print_row(name_of_blend.data(), [&blend](const Sent& one) {
+      const auto share =
+          static_cast<double>(shading::ssdf_share(one.sharpness, blend.low, blend.high));
+      return (1 - share) * one.by_sum[blend.sum] + share * one.by_distance[0];
+    });
+  }
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ void expand_precompute(v1::Precompute& settings) {
   count(settings.has_sg_count(), &Settings::set_sg_count, 48);
   count(settings.has_max_path_length(), &Settings::set_max_path_length, 10000);
   fill(settings, &Settings::has_cell_length_mfp, &Settings::set_cell_length_mfp, 1);
-  fill(settings, &Settings::has_sg_sharpness, &Settings::set_sg_sharpness, 128);
+  fill(settings, &Settings::has_sg_sharpness, &Settings::set_sg_sharpness, 64);
 }
 
 // Lengthens segments, then lowers fibre_share until the tile has about kPreviewSegments. Fewer

@@ -18,9 +18,9 @@ namespace weft::render {
 struct PrecomputedSettings {
   // Visibility of a Gaussian light is taken from the sum of Gaussians up to sharpness blend_low,
   // from the signed distance above blend_high, and blended linearly in between (Khungurn et al.
-  // 2017, section 5.2.2).
-  float blend_low = 100;
-  float blend_high = 200;
+  // 2017, section 5.2.2, with 100 and 200; docs/accuracy.md has the study).
+  float blend_low = 20;
+  float blend_high = 80;
   int gamma_method = shading::kGammaHybrid;  // or kGammaClosed, kGammaGl12
 };
 

@@ -217,7 +217,7 @@ TEST(PrecomputedFabric, HalfSpaceDimsAGaussianLightByItsEdge) {
 
 TEST(PrecomputedFabric, BlendsBothVisibilitiesLinearly) {
   const ShadingPoint at = fabric().point(kHalfSpace, kTangent, kOmegaO);
-  const SphericalGaussian light{{0, 0, 1}, 125};
+  const SphericalGaussian light{{0, 0, 1}, 35};
   PrecomputedSettings gaussians;
   gaussians.blend_low = 1e6f;
   gaussians.blend_high = 2e6f;
