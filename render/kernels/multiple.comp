@@ -37,8 +37,13 @@ void main() {
   vec3 radiance = vec3(0.0f);
   for (int channel = 0; channel < 3; ++channel) {
     ShVector c = sh_zero();
-    for (int j = 0; j < harmonics; ++j) {
-      c.c[j] = arriving[arriving_index(item, channel, j, harmonics)];
+    for (int row = 0; row < 6; ++row) {
+      for (int k = 0; k < 6; ++k) {
+        int j = 6 * row + k;
+        if (j < harmonics) {
+          c.c[j] = arriving[arriving_index(item, channel, j, harmonics)];
+        }
+      }
     }
     if (call.transferred == 0) {
       c = transferred(kFabric, cell, channel, c);
