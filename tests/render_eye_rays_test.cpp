@@ -205,6 +205,28 @@ TEST_F(EyeRays, DoNotDependOnHowAPictureIsDivided) {
   }
 }
 
+TEST_F(EyeRays, KeepTheGridsOfFabricsThatLive) {
+  gpu::GridCache cache;
+  {
+    const Scene scene = four_pieces(true);
+    const gpu::GeometryArrays first = gpu::pack_geometry(scene.cloths, {}, &cache);
+    EXPECT_EQ(cache.size(), first.fabrics.size());
+    const Fabric& fabric = scene.cloths[0]->fabric();
+    const gpu::FabricGrid* grid = &cache.grid_of(fabric, {});
+    const gpu::GeometryArrays again = gpu::pack_geometry(scene.cloths, {}, &cache);
+    EXPECT_EQ(&cache.grid_of(fabric, {}), grid);
+    EXPECT_EQ(again.entries, first.entries);
+    EXPECT_EQ(again.voxels, first.voxels);
+    gpu::GeometrySettings coarse;
+    coarse.grid.capsules_per_voxel = 20;
+    EXPECT_LT(gpu::pack_geometry(scene.cloths, coarse, &cache).entries.size(),
+              first.entries.size());
+  }
+  const Scene other = four_pieces(true);
+  static_cast<void>(cache.grid_of(other.cloths[0]->fabric(), {}));
+  EXPECT_EQ(cache.size(), 1U);
+}
+
 TEST_F(EyeRays, GoOnWhereOneRoundDoesNotSuffice) {
   Scene scene;
   FlatPlacement swatch;

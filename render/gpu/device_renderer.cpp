@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "render/gpu/eye_rays.h"
 
 namespace weft::render::gpu {
 namespace {
@@ -17,15 +18,21 @@ std::string mebibytes(std::uint64_t bytes) {
 
 DeviceRenderer::DeviceRenderer(std::string wanted, const DeviceOptions& options)
     : wanted_(std::move(wanted)), options_(options), device_(Device::open(wanted_, options_)) {
+  make_kernels();
+}
+
+void DeviceRenderer::make_kernels() {
   kernels_ = std::make_unique<ShadingKernels>(*device_);
+  eye_kernel_ = std::make_unique<Kernel>(EyeRays::make_kernel(*device_));
 }
 
 void DeviceRenderer::reopen() {
   kept_.clear();
   kernels_.reset();
+  eye_kernel_.reset();
   device_.reset();
   device_ = Device::open(wanted_, options_);
-  kernels_ = std::make_unique<ShadingKernels>(*device_);
+  make_kernels();
 }
 
 void DeviceRenderer::drop_gone_fabrics() {

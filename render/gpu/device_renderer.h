@@ -9,6 +9,7 @@
 #include "render/fabric.h"
 #include "render/gpu/device.h"
 #include "render/gpu/fabric_tables.h"
+#include "render/gpu/grid_cache.h"
 #include "render/gpu/shading_pass.h"
 
 namespace weft::render::gpu {
@@ -23,6 +24,9 @@ class DeviceRenderer {
   [[nodiscard]] const DeviceInfo& info() const { return device_->info(); }
   [[nodiscard]] Device& device() { return *device_; }
   [[nodiscard]] const ShadingKernels& kernels() const { return *kernels_; }
+  [[nodiscard]] const Kernel& eye_kernel() const { return *eye_kernel_; }
+  // Of the fabrics it has drawn, kept as long as they live.
+  [[nodiscard]] GridCache& grids() { return grids_; }
 
   // The tables of these fabrics, uploaded where they are not kept. `besides_bytes` is what the
   // drawing will allocate too. Fabrics that are gone, and others when room is needed, are dropped
@@ -43,12 +47,15 @@ class DeviceRenderer {
     std::weak_ptr<const void> life;
     std::unique_ptr<DeviceFabricTables> tables;
   };
+  void make_kernels();
   void drop_gone_fabrics();
 
   std::string wanted_;
   DeviceOptions options_;
   std::unique_ptr<Device> device_;
   std::unique_ptr<ShadingKernels> kernels_;
+  std::unique_ptr<Kernel> eye_kernel_;
+  GridCache grids_;
   std::map<const Fabric*, Kept> kept_;
 };
 

@@ -110,14 +110,14 @@ struct DeviceDrawing::OnDevice {
     std::uint32_t band_rows;
     std::uint32_t harmonics;
   };
-  OnDevice(Device& device, const GeometryArrays& arrays, const EyeView& view, const Sizes& sizes,
-           ShadingPass::Parts parts, const ShadingSettings& settings)
+  OnDevice(DeviceRenderer& renderer, const GeometryArrays& arrays, const EyeView& view,
+           const Sizes& sizes, ShadingPass::Parts parts, const ShadingSettings& settings)
       : band_rows(sizes.band_rows),
-        geometry(device, arrays),
-        eye_rays(device, geometry, view, sizes.most_rays),
-        buffers(device, static_cast<std::uint32_t>(sizes.most_rays), sizes.band_rows * view.width,
-                sizes.harmonics),
-        shading(device, with_solid(std::move(parts), geometry), settings),
+        geometry(renderer.device(), arrays),
+        eye_rays(renderer.device(), geometry, view, sizes.most_rays, &renderer.eye_kernel()),
+        buffers(renderer.device(), static_cast<std::uint32_t>(sizes.most_rays),
+                sizes.band_rows * view.width, sizes.harmonics),
+        shading(renderer.device(), with_solid(std::move(parts), geometry), settings),
         seed(eye_task(view, {}, geometry.cloths()).seed) {}
 
   static ShadingPass::Parts with_solid(ShadingPass::Parts parts, const DeviceGeometry& geometry) {
@@ -159,7 +159,7 @@ void DeviceDrawing::put_on_device() {
   const DeviceInfo& info = renderer_.info();
   GeometrySettings grid;
   grid.nearest_volume = settings_.nearest_samples > 0;
-  const GeometryArrays geometry = pack_geometry(scene_.cloths, grid);
+  const GeometryArrays geometry = pack_geometry(scene_.cloths, grid, &renderer_.grids());
   fabrics_ = geometry.sources;
   const Needs needs = needs_of(scene_, geometry);
   const OnDevice::Sizes sizes{most_rays_of(settings_, info, needs.harmonics),
@@ -182,7 +182,7 @@ void DeviceDrawing::put_on_device() {
     }
   }
   on_device_ = std::make_unique<OnDevice>(
-      renderer_.device(), geometry, eye_view_of(scene_, settings_), sizes, std::move(parts),
+      renderer_, geometry, eye_view_of(scene_, settings_), sizes, std::move(parts),
       ShadingSettings{settings_.scattering, settings_.picture.layers.has(Layer::kShadow)});
   rays_at_once_ = std::min(kFirstRays, sizes.most_rays);
 }

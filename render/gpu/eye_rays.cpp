@@ -53,15 +53,23 @@ EyeTask eye_task(const EyeView& view, const EyeBatch& batch, int cloths) {
 }
 
 EyeRays::EyeRays(Device& device, const DeviceGeometry& geometry, const EyeView& view,
-                 std::uint64_t most_rays)
+                 std::uint64_t most_rays, const Kernel* kernel)
     : device_(device),
       geometry_(geometry),
       view_(view),
       most_rays_(most_rays),
-      kernel_(device.make_kernel(kernels::eye_rays, kBuffers, sizeof(EyeTask))),
+      kernel_(kernel),
       hits_(device.allocate(most_rays * sizeof(DeviceHit), "what eye rays hit")),
       searches_(device.allocate(most_rays * sizeof(EyeSearch), "how far eye rays have come")),
-      unfinished_(device.allocate(sizeof(std::uint32_t), "a count of eye rays")) {}
+      unfinished_(device.allocate(sizeof(std::uint32_t), "a count of eye rays")) {
+  if (kernel_ == nullptr) {
+    kernel_ = &own_kernel_.emplace(make_kernel(device));
+  }
+}
+
+Kernel EyeRays::make_kernel(Device& device) {
+  return device.make_kernel(kernels::eye_rays, kBuffers, sizeof(EyeTask));
+}
 
 std::uint64_t EyeRays::size_bytes(std::uint64_t most_rays) {
   return most_rays * (sizeof(DeviceHit) + sizeof(EyeSearch)) + sizeof(std::uint32_t);
@@ -72,7 +80,7 @@ double EyeRays::follow(const EyeBatch& batch) {
   CHECK(batch.left + batch.columns <= view_.width && batch.top + batch.rows <= view_.height);
   EyeTask task = eye_task(view_, batch, geometry_.cloths());
   Dispatch dispatch;
-  dispatch.kernel = &kernel_;
+  dispatch.kernel = kernel_;
   dispatch.buffers = geometry_.solid_buffers();
   for (const Buffer* buffer : geometry_.grid_buffers()) {
     dispatch.buffers.push_back(buffer);

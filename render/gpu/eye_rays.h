@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "render/camera.h"
 #include "render/gpu/device_geometry.h"
@@ -40,9 +41,17 @@ struct EyeBatch {
 class EyeRays {
  public:
   // Memory for batches of at most `most_rays`. Throws core::Error(kResourceExhausted) with figures.
-  // REQUIRES: with nearest_samples the geometry holds the volumes (GeometrySettings).
+  // `kernel` is what make_kernel() made, for those who keep it; else it is made here. REQUIRES:
+  // with nearest_samples the geometry holds the volumes (GeometrySettings).
   EyeRays(Device& device, const DeviceGeometry& geometry, const EyeView& view,
-          std::uint64_t most_rays);
+          std::uint64_t most_rays, const Kernel* kernel = nullptr);
+  EyeRays(const EyeRays&) = delete;
+  EyeRays& operator=(const EyeRays&) = delete;
+  EyeRays(EyeRays&&) = delete;
+  EyeRays& operator=(EyeRays&&) = delete;
+  ~EyeRays() = default;
+
+  [[nodiscard]] static Kernel make_kernel(Device& device);
 
   // Bytes that the constructor allocates.
   [[nodiscard]] static std::uint64_t size_bytes(std::uint64_t most_rays);
@@ -58,7 +67,8 @@ class EyeRays {
   const DeviceGeometry& geometry_;
   EyeView view_;
   std::uint64_t most_rays_;
-  Kernel kernel_;
+  std::optional<Kernel> own_kernel_;
+  const Kernel* kernel_;
   Buffer hits_;
   Buffer searches_;
   Buffer unfinished_;

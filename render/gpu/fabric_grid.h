@@ -14,6 +14,7 @@ struct GridSettings {
   // Capsules that a voxel among the fibres lists on average, as far as memory permits: more make
   // the march slower, fewer the grid larger.
   double capsules_per_voxel = 3;
+  bool operator==(const GridSettings&) const = default;
 };
 
 // The arrays of render/kernels/grid_records.h for one fabric. Indices count from these arrays' own

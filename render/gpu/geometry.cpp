@@ -12,7 +12,6 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "render/gpu/bounds_tree.h"
-#include "render/gpu/nearest_volume.h"
 
 namespace weft::render::gpu {
 namespace {
@@ -132,7 +131,7 @@ void append(GeometryArrays& arrays, const FabricGrid& grid) {
 
 class Packer {
  public:
-  explicit Packer(const GeometrySettings& settings) : settings_(settings) {}
+  Packer(const GeometrySettings& settings, GridCache& cache) : settings_(settings), cache_(cache) {}
 
   GeometryArrays pack(std::span<const std::unique_ptr<Cloth>> cloths) {
     for (const auto& cloth : cloths) {
@@ -182,18 +181,18 @@ class Packer {
     const auto index = found - arrays_.sources.begin();
     if (found == arrays_.sources.end()) {
       arrays_.sources.push_back(&fabric);
-      append(arrays_, build_fabric_grid(fabric.tile(), settings_.grid));
+      append(arrays_, cache_.grid_of(fabric, settings_.grid));
       if (settings_.nearest_volume) {
-        add_nearest_volume(fabric.tile(), arrays_.fabrics.back());
+        add_nearest_volume(fabric, arrays_.fabrics.back());
       }
     }
     return static_cast<int>(index);
   }
 
-  void add_nearest_volume(const fabric::Tile& tile, shading::DeviceFabric& fabric) {
-    const NearestVolume volume =
-        build_nearest_volume(tile, static_cast<double>(fabric.z_low_mm),
-                             static_cast<double>(fabric.z_high_mm), settings_.most_nearest_bytes);
+  void add_nearest_volume(const Fabric& source, shading::DeviceFabric& fabric) {
+    const NearestVolume& volume =
+        cache_.volume_of(source, static_cast<double>(fabric.z_low_mm),
+                         static_cast<double>(fabric.z_high_mm), settings_.most_nearest_bytes);
     fabric.nearest_voxels = volume.voxels;
     fabric.first_nearest = next_index(arrays_.nearest.size(), volume.segments.size());
     arrays_.nearest.insert(arrays_.nearest.end(), volume.segments.begin(), volume.segments.end());
@@ -263,6 +262,7 @@ class Packer {
   }
 
   const GeometrySettings& settings_;
+  GridCache& cache_;
   GeometryArrays arrays_;
 };
 
@@ -293,9 +293,10 @@ std::uint64_t GeometryArrays::size_bytes() const {
 }
 
 GeometryArrays pack_geometry(std::span<const std::unique_ptr<Cloth>> cloths,
-                             const GeometrySettings& settings) {
+                             const GeometrySettings& settings, GridCache* cache) {
   CHECK(!cloths.empty());
-  return Packer(settings).pack(cloths);
+  GridCache own;
+  return Packer(settings, cache != nullptr ? *cache : own).pack(cloths);
 }
 
 }  // namespace weft::render::gpu

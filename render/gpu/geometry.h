@@ -8,6 +8,7 @@
 
 #include "render/cloth.h"
 #include "render/gpu/fabric_grid.h"
+#include "render/gpu/grid_cache.h"
 #include "render/kernels/cloth_records.h"
 #include "render/kernels/grid_records.h"
 
@@ -47,9 +48,11 @@ struct GeometrySettings {
 };
 
 // Throws core::Error(kResourceExhausted) with figures when a fabric's fibres or a shell are too
-// many to be named or held. The fabrics must outlive the arrays. REQUIRES: a piece of cloth.
+// many to be named or held. Takes grids from `cache`, when given, and leaves new ones there. The
+// fabrics must outlive the arrays. REQUIRES: a piece of cloth.
 [[nodiscard]] GeometryArrays pack_geometry(std::span<const std::unique_ptr<Cloth>> cloths,
-                                           const GeometrySettings& settings = {});
+                                           const GeometrySettings& settings = {},
+                                           GridCache* cache = nullptr);
 
 }  // namespace weft::render::gpu
 
