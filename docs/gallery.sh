@@ -39,11 +39,10 @@ drape='cloths { black_underlay: true
 view='camera { position { x: 12 y: -42 z: 26 } look_at { z: -1.5 } perspective { vertical_angle_deg: 30 } }'
 flat='cloths { flat { endless: true } black_underlay: true }
 cut_lights_at_horizon: true'
-background='picture { background { r: 0.02 g: 0.02 b: 0.02 } }'
 
 for fabric in $fabrics; do
   draw "${fabric}_draped" "$fabric" 256x256 8 << SCENE
-$view $key $fill $drape $background
+$view $key $fill $drape
 SCENE
   # Some yarns across: the fibres are seen.
   draw "${fabric}_close" "$fabric" 192x192 16 << SCENE
@@ -55,11 +54,11 @@ done
 # The same satin from near by, and from so far that a pixel is several yarns.
 draw satin_4_1_near satin_4_1 256x256 8 << SCENE
 camera { position { x: 4 y: -14 z: 12 } look_at { y: -3 z: 5 } perspective { vertical_angle_deg: 22 } }
-$key $fill $drape $background
+$key $fill $drape
 SCENE
 draw satin_4_1_far satin_4_1 256x256 16 << SCENE
 camera { position { x: 60 y: -210 z: 130 } look_at { z: -1.5 } perspective { vertical_angle_deg: 12 } }
-$key $fill $drape $background
+$key $fill $drape
 SCENE
 
 # Five lights of about the same irradiance.
@@ -76,17 +75,17 @@ draw light_point satin_1_4 192x192 8 << SCENE
 $view lights { point { position { x: -14 y: -12 z: 18 } intensity { r: 2000 g: 2000 b: 2000 } } } $drape
 SCENE
 draw light_area satin_1_4 192x192 16 << SCENE
-$view lights { area { rectangle { corner { x: -40 y: -20 z: 30 } edge_a { y: -25 } edge_b { x: 25 z: 25 } }
+$view lights { area { rectangle { corner { x: -40 y: -20 z: 30 } edge_a { x: 25 z: 25 } edge_b { y: -25 } }
   radiance { r: 12 g: 12 b: 12 } } } $drape
 SCENE
 
 # A sky, drawn by directions and as spherical Gaussians that were fitted to it.
 sky='lights { environment { exr_file: "sky.exr" } }'
 draw sky_drawn shot_silk_a 256x256 16 << SCENE
-$view $sky $drape $background
+$view $sky $drape
 SCENE
 draw sky_fitted shot_silk_a 256x256 8 << SCENE
-$view $sky $drape $background integration { environment_lights: 32 }
+$view $sky $drape integration { environment_lights: 32 }
 SCENE
 
 # Patterned cloth.
@@ -98,5 +97,5 @@ $key $fill cloths { $pattern flat { endless: true } black_underlay: true } cut_l
 SCENE
 draw damask_draped satin_4_1 256x256 8 << SCENE
 $view $key $fill cloths { $pattern black_underlay: true
-  shell { obj_file: "drape.obj" texture_width_mm: 30 texture_height_mm: 30 } } $background
+  shell { obj_file: "drape.obj" texture_width_mm: 30 texture_height_mm: 30 } }
 SCENE
