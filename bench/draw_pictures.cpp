@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <memory>
 #include <string>
 
 #include <glm/geometric.hpp>
@@ -17,6 +18,7 @@
 #include "render/build_scene.h"
 #include "render/compare.h"
 #include "render/draw.h"
+#include "render/gpu/draw_on_device.h"
 #include "render/image.h"
 #include "render/make_integrator.h"
 #include "render/png.h"
@@ -38,25 +40,19 @@ double relative_error(const render::Drawing& drawing) {
   return mean > 0 ? glm::length(drawing.cloth_standard_error) / 3 / mean : 1e30;
 }
 
-Drawn draw(const PictureRequest& request, const render::Scene& scene, core::Interrupt& interrupt) {
-  const auto integrator = render::make_integrator(request.scene.integration(), scene);
-  render::DrawSettings settings;
-  settings.width = request.scene.picture().width();
-  settings.height = request.scene.picture().height();
-  settings.seed = request.scene.integration().seed();
+// Adds samples to `growing` (render::GrowingDrawing or one of a device) by `add` as long as the
+// request wants more.
+template <class Growing, class Add>
+Drawn grow(const PictureRequest& request, Growing& growing, const Add& add,
+           const core::Stopwatch& watch) {
   const bool adaptive = request.target_error > 0;
   const std::uint32_t most =
       adaptive ? request.most_samples : request.scene.picture().samples_per_pixel();
-  settings.samples_per_pixel = most;
-  render::GrowingDrawing growing(settings);
-  const core::Stopwatch watch;
   Drawn drawn;
   while (true) {
     const std::uint32_t next =
         adaptive ? std::max(growing.samples(), std::min(kFirstSamples, most)) : most;
-    growing.add_samples(
-        scene.camera, *integrator, std::min(next, most - growing.samples()), [](double) {},
-        [&] { return interrupt.requested(); });
+    add(std::min(next, most - growing.samples()));
     drawn.seconds = watch.seconds();
     const bool last = growing.samples() >= most ||
                       (request.most_seconds > 0 && drawn.seconds > request.most_seconds);
@@ -67,6 +63,48 @@ Drawn draw(const PictureRequest& request, const render::Scene& scene, core::Inte
   }
   drawn.samples = growing.samples();
   return drawn;
+}
+
+// The device of the last request that named one.
+struct Drawer {
+  core::Interrupt interrupt;
+  std::string device;
+  std::unique_ptr<render::gpu::DeviceRenderer> renderer;
+};
+
+// Seconds are those of all that a picture takes once the fabric is loaded.
+Drawn draw(const PictureRequest& request, const render::Scene& scene, Drawer& drawer) {
+  render::DrawSettings settings;
+  settings.width = request.scene.picture().width();
+  settings.height = request.scene.picture().height();
+  settings.seed = request.scene.integration().seed();
+  settings.samples_per_pixel = request.scene.picture().samples_per_pixel();
+  const auto no_progress = [](double) {};
+  const auto should_stop = [&] { return drawer.interrupt.requested(); };
+  if (!request.device.empty()) {
+    if (!drawer.renderer || drawer.device != request.device) {
+      drawer.renderer.reset();
+      drawer.renderer = std::make_unique<render::gpu::DeviceRenderer>(request.device);
+      drawer.device = request.device;
+    }
+    const core::Stopwatch watch;
+    render::gpu::DeviceDrawSettings on_device;
+    on_device.picture = settings;
+    on_device.nearest_samples = request.nearest_samples;
+    render::gpu::DeviceDrawing growing(*drawer.renderer, scene, on_device);
+    return grow(
+        request, growing,
+        [&](std::uint32_t count) { growing.add_samples(count, no_progress, should_stop); }, watch);
+  }
+  const core::Stopwatch watch;
+  const auto integrator = render::make_integrator(request.scene.integration(), scene);
+  render::GrowingDrawing growing(settings);
+  return grow(
+      request, growing,
+      [&](std::uint32_t count) {
+        growing.add_samples(scene.camera, *integrator, count, no_progress, should_stop);
+      },
+      watch);
 }
 
 nlohmann::json triple(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -100,13 +138,12 @@ void compare_with(const PictureRequest& request, const render::Image& image,
   }
 }
 
-nlohmann::json answer_to(const std::string& line, FabricCache& fabrics,
-                         core::Interrupt& interrupt) {
+nlohmann::json answer_to(const std::string& line, FabricCache& fabrics, Drawer& drawer) {
   const PictureRequest request = parse_request(line);
   const auto fabric = fabrics.take(request.fabric);
   const render::Scene scene =
       render::build_scene(request.scene, [&](const std::string&) { return fabric; });
-  Drawn drawn = draw(request, scene, interrupt);
+  Drawn drawn = draw(request, scene, drawer);
   const render::Drawing& drawing = drawn.drawing;
   nlohmann::json answer = {{"cloth_mean", triple(drawing.cloth_mean)},
                            {"cloth_standard_error", triple(drawing.cloth_standard_error)},
@@ -136,18 +173,18 @@ nlohmann::json answer_to(const std::string& line, FabricCache& fabrics,
 }  // namespace weft::bench
 
 int main() {
-  weft::core::Interrupt interrupt;
+  weft::bench::Drawer drawer;
   weft::bench::FabricCache fabrics;
   std::string line;
   while (std::getline(std::cin, line)) {
     nlohmann::json answer;
     try {
-      answer = weft::bench::answer_to(line, fabrics, interrupt);
+      answer = weft::bench::answer_to(line, fabrics, drawer);
     } catch (const std::exception& error) {
       answer = {{"error", error.what()}};
     }
     std::cout << answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
-    if (interrupt.requested()) {
+    if (drawer.interrupt.requested()) {
       return 1;
     }
   }

@@ -39,6 +39,7 @@ PictureRequest parse_request(const std::string& line) {
     const nlohmann::json json = nlohmann::json::parse(line);
     request.fabric = parse_fabric(json);
     request.device = json.value("device", "");
+    request.nearest_samples = json.value("nearest_samples", 0U);
     request.target_error = json.value("target_error", 0.0);
     request.most_samples = json.value("most_samples", 1024U);
     request.most_seconds = json.value("most_seconds", 0.0);

@@ -29,8 +29,10 @@ struct FabricChoice {
 // looked for in `folder`) MUST be there.
 struct PictureRequest {
   FabricChoice fabric;
-  v1::Scene scene;     // defaults expanded
-  std::string device;  // draw there; empty: on the CPU
+  v1::Scene scene;  // defaults expanded
+  // Draw on this device (weft render --list-devices; "auto": the best); empty: on the CPU.
+  std::string device;
+  std::uint32_t nearest_samples = 0;  // of the device: the paper's nearest midpoints; 0: exact
   // Samples are added until the relative standard error of the mean colour is at or below
   // target_error (0: as many samples as the scene says), or there are most_samples, or after
   // most_seconds (0: no limit).

@@ -5,7 +5,7 @@ from evaluation import scenes
 from evaluation.renderer import ROOT, say
 
 LIGHTS = [None, 10, 50, 150, 400]
-METHODS = ["precomputed", "dual"]
+METHODS = ["precomputed", "device", "dual"]
 # The paper's figure 16, as far as there are databases of them.
 PREFERRED = ["fleece", "silk_plain", "satin_2_3"]
 

@@ -14,10 +14,13 @@ VIEWS = [(0, 0)] + [(polar, azimuth) for polar in (15, 30, 45, 60, 75)
                     for azimuth in range(0, 360, 45)]
 CONFIGURATIONS = [(light, view) for light in LIGHTS for view in VIEWS]
 assert len(CONFIGURATIONS) == 492
-# Any number of them from the start is spread over all: 205 has no factor in common with 492.
-ORDER = [(205 * k) % 492 for k in range(492)]
+# Any number of them from the start is spread over all: 305, about 492 over the golden ratio, has no
+# factor in common with 492.
+ORDER = [(305 * k) % 492 for k in range(492)]
+assert len(set(ORDER)) == 492
 
-METHODS = ["path", "precomputed", "dual"]
+METHODS = ["path", "precomputed", "device", "device-32", "device-64", "device-128", "dual"]
+LIGHTS_METHODS = ["path", "precomputed", "device", "dual"]
 SEEDS = {"path": 1}  # every other method draws other samples: errors are independent
 
 
@@ -54,7 +57,7 @@ def run_lights(bench, fabrics, deadline, methods=None):
         for sharpness in [None] + scenes.SHARPNESS:
             for fabric in fabrics:
                 for side, view in SIDES.items():
-                    for method in methods or METHODS:
+                    for method in methods or LIGHTS_METHODS:
                         if deadline.over():
                             say("lights: time is up")
                             return

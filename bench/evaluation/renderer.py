@@ -16,6 +16,12 @@ METHODS = {
     "path": ("integrator: INTEGRATOR_PATH local: true", {}),
     "truth": ("integrator: INTEGRATOR_PATH", {}),
     "precomputed": ("integrator: INTEGRATOR_PRECOMPUTED", {}),
+    "device": ("integrator: INTEGRATOR_PRECOMPUTED", {"device": "auto"}),
+    # The paper's search for the fibre: the nearest midpoint, by so many samples of a tetrahedron.
+    "device-32": ("integrator: INTEGRATOR_PRECOMPUTED", {"device": "auto", "nearest_samples": 32}),
+    "device-64": ("integrator: INTEGRATOR_PRECOMPUTED", {"device": "auto", "nearest_samples": 64}),
+    "device-128": ("integrator: INTEGRATOR_PRECOMPUTED",
+                   {"device": "auto", "nearest_samples": 128}),
     "dual": ("integrator: INTEGRATOR_DUAL local: true", {}),
     "prt": ("integrator: INTEGRATOR_PRT", {}),
 }
