@@ -14,7 +14,7 @@ BLEND_CASES = [(sharpness, view) for sharpness in (10, 50, 100, 150, 200, 400)
 
 # Cell length in mean free paths; the last makes one cell of the tile.
 CELL_LENGTHS = [0.5, 1, 1.5, 2, 1000]
-BLENDS = [(0.5, 1), (10, 20), (25, 50), (50, 100), (100, 200), (200, 400), (1000, 2000)]
+BLENDS = [(0.5, 1), (10, 20), (20, 80), (50, 100), (100, 200), (200, 400), (1000, 2000)]
 COMPONENTS = [4, 8, 16, 24, 32, 48]
 
 
