@@ -106,6 +106,7 @@ void PictureFiles::write(const render::Frame& frame, const render::Picture& pict
   const WrittenPicture names = written_picture(frame);
   std::map<std::string, std::string> attributes = recipe(frame, picture.samples_per_pixel);
   attributes.merge(figures_of(picture.drawing));
+  attributes["weft.device"] = picture.device;
   render::Drawing drawing = picture.drawing;
   drawing.image.attributes = attributes;
   render::attach_layers(drawing, render::layers_of(frame.scene.picture()));
@@ -140,6 +141,7 @@ void PictureFiles::finish(const render::Frame& frame, const render::Picture& pic
   written.cloth_share = picture.drawing.cloth_share;
   written.load_seconds = picture.load_seconds;
   written.draw_seconds = picture.draw_seconds;
+  written.device = picture.device;
   written_.push_back(written);
 }
 

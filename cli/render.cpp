@@ -14,6 +14,7 @@
 #include "cli/list_devices.h"
 #include "cli/picture_files.h"
 #include "cli/progress.h"
+#include "cli/render_device.h"
 #include "cli/render_options.h"
 #include "cli/render_report.h"
 #include "core/digest.h"
@@ -54,7 +55,10 @@ void warn_of_changed_fabrics(const std::string& again, const FabricIdentities& n
 
 void draw_here(const RenderOptions& options, const v1::Scene& scene,
                const std::function<bool()>& should_stop, FabricShelf& shelf, PictureFiles& files) {
+  const std::unique_ptr<render::gpu::DeviceRenderer> device =
+      open_render_device(options.device, scene);
   render::PictureSettings settings;
+  settings.device = device.get();
   settings.threads = options.threads;
   settings.progressive = options.progressive;
   settings.environment_cache = environment_cache_folder();

@@ -95,6 +95,9 @@ v1::Scene described_scene(RenderOptions& options) {
   } else if (options.multiple_only) {
     integration.set_scattering(v1::SCATTERING_MULTIPLE_ONLY);
   }
+  if (options.paper) {
+    integration.set_paper(true);
+  }
   if (options.environment_lights) {
     integration.set_environment_lights(*options.environment_lights);
   }
@@ -155,7 +158,15 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
       ->check(CLI::Range(0U, render::kMostFittedLights));
   command.add_option("--spp", options.samples, "Samples per pixel")->check(CLI::Range(1, 1 << 20));
   command.add_option("--size", options.size, "WIDTHxHEIGHT in pixels");
-  command.add_option("--threads", options.threads, "Threads; default: all the machine has")
+  command.add_flag("--paper", options.paper,
+                   "Precomputed integrator: shade Gaussian lights by the paper's choices");
+  command
+      .add_option("--device", options.device,
+                  "What draws the precomputed integrator: auto (a GPU, else the software device), "
+                  "cpu, or an index or name of --list-devices")
+      ->capture_default_str();
+  command
+      .add_option("--threads", options.threads, "Threads of the CPU; default: all the machine has")
       ->check(CLI::Range(0, 1024));
   command.add_option("--seed", options.seed, "Seed of the samples");
   auto* single =

@@ -30,8 +30,10 @@ struct RenderOptions {
   std::optional<float> exposure;
   std::string single_from;
   std::string multiple_from;
+  std::string device = "auto";
   unsigned threads = 0;
   bool local = false;
+  bool paper = false;
   bool single_only = false;
   bool multiple_only = false;
   bool floats = false;

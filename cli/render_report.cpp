@@ -23,7 +23,8 @@ nlohmann::json json_of(const WrittenPicture& picture, const std::string& integra
           {"cloth_standard_error", triple(picture.cloth_standard_error)},
           {"cloth_share", picture.cloth_share},
           {"load_seconds", picture.load_seconds},
-          {"draw_seconds", picture.draw_seconds}};
+          {"draw_seconds", picture.draw_seconds},
+          {"device", picture.device}};
 }
 
 void print_frames(const std::vector<WrittenPicture>& pictures) {
@@ -50,8 +51,9 @@ void print_picture(const WrittenPicture& picture) {
              picture.cloth_mean.x, picture.cloth_mean.y, picture.cloth_mean.z,
              picture.cloth_standard_error.x, picture.cloth_standard_error.y,
              picture.cloth_standard_error.z);
-  fmt::print("loaded in {}, drawn in {}\n", format_duration(picture.load_seconds),
-             format_duration(picture.draw_seconds));
+  fmt::print("loaded in {}, drawn in {} by {}\n", format_duration(picture.load_seconds),
+             format_duration(picture.draw_seconds),
+             picture.device == "cpu" ? "the CPU" : picture.device);
 }
 
 }  // namespace

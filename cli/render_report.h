@@ -23,6 +23,7 @@ struct WrittenPicture {
   double cloth_share = 0;
   double load_seconds = 0;
   double draw_seconds = 0;
+  std::string device;  // that drew it
 };
 
 // Says on stdout what was drawn and how long it took: of one picture its figures, of an animation a

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <memory>
 #include <utility>
+#include <variant>
 
 #include "core/clock.h"
 #include "core/error.h"
 #include "render/animation.h"
 #include "render/environment_cache.h"
+#include "render/gpu/draw_on_device.h"
 #include "render/make_integrator.h"
 #include "render/scene_check.h"
 
@@ -31,6 +33,74 @@ std::uint32_t next_pass(std::uint32_t drawn, std::uint32_t wanted, bool progress
   return progressive ? std::min(std::max(drawn, 1U), wanted - drawn) : wanted;
 }
 
+// A drawing that grows, by whichever means.
+class Growing {
+ public:
+  Growing() = default;
+  Growing(const Growing&) = delete;
+  Growing& operator=(const Growing&) = delete;
+  Growing(Growing&&) = delete;
+  Growing& operator=(Growing&&) = delete;
+  virtual ~Growing() = default;
+
+  virtual void add(std::uint32_t count, const std::function<void(double)>& progress,
+                   const std::function<bool()>& should_stop) = 0;
+  [[nodiscard]] virtual std::uint32_t samples() const = 0;
+  [[nodiscard]] virtual Drawing drawing() const = 0;
+};
+
+class GrowingOnCpu : public Growing {
+ public:
+  GrowingOnCpu(const v1::Integration& integration, const Scene& scene, const DrawSettings& settings)
+      : scene_(scene),
+        integrator_(make_integrator(integration, scene, settings.layers.has(Layer::kShadow))),
+        growing_(settings) {}
+  void add(std::uint32_t count, const std::function<void(double)>& progress,
+           const std::function<bool()>& should_stop) override {
+    growing_.add_samples(scene_.camera, *integrator_, count, progress, should_stop);
+  }
+  [[nodiscard]] std::uint32_t samples() const override { return growing_.samples(); }
+  [[nodiscard]] Drawing drawing() const override { return growing_.drawing(); }
+
+ private:
+  const Scene& scene_;
+  std::unique_ptr<Integrator> integrator_;
+  GrowingDrawing growing_;
+};
+
+class GrowingOnDevice : public Growing {
+ public:
+  GrowingOnDevice(gpu::DeviceRenderer& device, const v1::Integration& integration,
+                  const Scene& scene, const DrawSettings& settings)
+      : growing_(device, scene, device_settings(integration, settings)) {}
+  void add(std::uint32_t count, const std::function<void(double)>& progress,
+           const std::function<bool()>& should_stop) override {
+    growing_.add_samples(count, progress, should_stop);
+  }
+  [[nodiscard]] std::uint32_t samples() const override { return growing_.samples(); }
+  [[nodiscard]] Drawing drawing() const override { return growing_.drawing(); }
+
+ private:
+  static gpu::DeviceDrawSettings device_settings(const v1::Integration& integration,
+                                                 const DrawSettings& picture) {
+    gpu::DeviceDrawSettings settings;
+    settings.picture = picture;
+    settings.scattering = scattering_of(integration);
+    if (integration.paper()) {
+      settings.shading = kPaperSettings;
+    }
+    return settings;
+  }
+
+  gpu::DeviceDrawing growing_;
+};
+
+bool has_environment(const Scene& scene) {
+  return std::any_of(scene.lights.begin(), scene.lights.end(), [](const Light& light) {
+    return std::holds_alternative<EnvironmentLight>(light);
+  });
+}
+
 class PictureDrawer {
  public:
   PictureDrawer(const PictureSettings& settings, const FabricSource& fabrics,
@@ -45,6 +115,14 @@ class PictureDrawer {
   void draw_frame(Frame& frame) {
     const core::Stopwatch loading;
     Scene scene = build_scene(frame.scene, fabrics_, files_);
+    const bool on_device =
+        settings_.device != nullptr && draws_on_device(frame.scene.integration());
+    if (on_device && frame.scene.integration().environment_lights() == 0 &&
+        has_environment(scene)) {
+      // Kernels know no other environments. The frame says so, to be drawn again.
+      frame.scene.mutable_integration()->set_environment_lights(
+          EnvironmentFitSettings{}.most_lights);
+    }
     if (frame.scene.integration().environment_lights() > 0) {
       EnvironmentFitSettings fit;
       fit.most_lights = frame.scene.integration().environment_lights();
@@ -55,15 +133,20 @@ class PictureDrawer {
       return;
     }
     const DrawSettings settings = draw_settings(frame.scene, settings_.threads);
-    const std::unique_ptr<Integrator> integrator =
-        make_integrator(frame.scene.integration(), scene, settings.layers.has(Layer::kShadow));
+    std::unique_ptr<Growing> growing;
+    if (on_device) {
+      growing = std::make_unique<GrowingOnDevice>(*settings_.device, frame.scene.integration(),
+                                                  scene, settings);
+    } else {
+      growing = std::make_unique<GrowingOnCpu>(frame.scene.integration(), scene, settings);
+    }
     const double load_seconds = loading.seconds();
     const core::Stopwatch drawing;
-    GrowingDrawing growing(settings);
-    while (growing.samples() < settings.samples_per_pixel) {
-      add_pass(scene, *integrator, settings, growing);
-      const Picture picture{growing.drawing(), growing.samples(), load_seconds, drawing.seconds()};
-      if (growing.samples() == settings.samples_per_pixel) {
+    while (growing->samples() < settings.samples_per_pixel) {
+      add_pass(settings, *growing);
+      const Picture picture{growing->drawing(), growing->samples(), load_seconds, drawing.seconds(),
+                            on_device ? settings_.device->info().name : "cpu"};
+      if (growing->samples() == settings.samples_per_pixel) {
         sink_.finish(frame, picture);
       } else {
         sink_.pass(frame, picture);
@@ -72,12 +155,11 @@ class PictureDrawer {
   }
 
  private:
-  void add_pass(const Scene& scene, const Integrator& integrator, const DrawSettings& settings,
-                GrowingDrawing& growing) {
+  void add_pass(const DrawSettings& settings, Growing& growing) {
     const std::uint32_t drawn = growing.samples();
     const std::uint32_t count = next_pass(drawn, settings.samples_per_pixel, settings_.progressive);
-    growing.add_samples(
-        scene.camera, integrator, count,
+    growing.add(
+        count,
         [&](double share) { sink_.progress((drawn + share * count) / settings.samples_per_pixel); },
         should_stop_);
   }

@@ -9,6 +9,7 @@
 #include "proto/weft/v1/scene.pb.h"
 #include "render/build_scene.h"
 #include "render/draw.h"
+#include "render/gpu/device_renderer.h"
 
 namespace weft::render {
 
@@ -17,6 +18,8 @@ struct PictureSettings {
   unsigned threads = 0;                     // 0: as many as the machine has
   bool progressive = false;                 // in passes of 1, 1, 2, 4, 8, ... samples a pixel
   std::filesystem::path environment_cache;  // fits of environments are kept here; empty: nowhere
+  // Draws what it can (draws_on_device); null: the CPU draws everything.
+  gpu::DeviceRenderer* device = nullptr;
 };
 
 // One picture of a scene: its only one, or a frame of its animation.
@@ -34,6 +37,7 @@ struct Picture {
   std::uint32_t samples_per_pixel = 0;  // fewer than the scene's while it is being refined
   double load_seconds = 0;
   double draw_seconds = 0;
+  std::string device = "cpu";  // that drew it
 };
 
 // Receives pictures as they come. Calls are made one at a time, in the order: for each frame

@@ -8,17 +8,6 @@
 namespace weft::render {
 namespace {
 
-Scattering scattering_of(const v1::Integration& integration) {
-  switch (integration.scattering()) {
-    case v1::SCATTERING_SINGLE_ONLY:
-      return Scattering::kSingleOnly;
-    case v1::SCATTERING_MULTIPLE_ONLY:
-      return Scattering::kMultipleOnly;
-    default:
-      return Scattering::kAll;
-  }
-}
-
 TermSource source_of(v1::TermSource source) {
   switch (source) {
     case v1::TERM_SOURCE_CELL:
@@ -31,6 +20,17 @@ TermSource source_of(v1::TermSource source) {
 }
 
 }  // namespace
+
+Scattering scattering_of(const v1::Integration& integration) {
+  switch (integration.scattering()) {
+    case v1::SCATTERING_SINGLE_ONLY:
+      return Scattering::kSingleOnly;
+    case v1::SCATTERING_MULTIPLE_ONLY:
+      return Scattering::kMultipleOnly;
+    default:
+      return Scattering::kAll;
+  }
+}
 
 std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration, const Scene& scene,
                                             bool wants_shadow) {
@@ -52,8 +52,18 @@ std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration, 
   }
   const TermSources sources{source_of(integration.single_from()),
                             source_of(integration.multiple_from())};
-  return std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration), wants_shadow,
-                                                 sources);
+  auto precomputed = std::make_unique<PrecomputedIntegrator>(scene, scattering_of(integration),
+                                                             wants_shadow, sources);
+  if (integration.paper()) {
+    precomputed->shade_by(kPaperSettings);
+  }
+  return precomputed;
+}
+
+bool draws_on_device(const v1::Integration& integration) {
+  return integration.integrator() == v1::INTEGRATOR_PRECOMPUTED &&
+         source_of(integration.single_from()) == TermSource::kDatabase &&
+         source_of(integration.multiple_from()) == TermSource::kDatabase;
 }
 
 bool reads_transfer(v1::Integrator integrator) {

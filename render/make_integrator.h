@@ -17,6 +17,12 @@ namespace weft::render {
                                                           const Scene& scene,
                                                           bool wants_shadow = false);
 
+// Which light the integration asks for.
+[[nodiscard]] Scattering scattering_of(const v1::Integration& integration);
+
+// Whether a Vulkan device can draw it (gpu/draw_on_device.h); what it cannot is the CPU's.
+[[nodiscard]] bool draws_on_device(const v1::Integration& integration);
+
 // Whether the integrator reads what was precomputed of a fabric, and not its fibres alone.
 [[nodiscard]] bool reads_transfer(v1::Integrator integrator);
 

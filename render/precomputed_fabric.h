@@ -24,6 +24,9 @@ struct PrecomputedSettings {
   int gamma_method = shading::kGammaHybrid;  // or kGammaClosed, kGammaGl12
 };
 
+// What the paper does (its 48 Gaussians a segment are a matter of the database).
+inline constexpr PrecomputedSettings kPaperSettings{100, 200, shading::kGammaClosed};
+
 // Where an eye ray met a fibre, prepared for any number of lights. All directions of this header
 // are unit vectors in the frame of the flat fabric that point away from the hit.
 struct ShadingPoint : shading::SeenFibre {
@@ -66,6 +69,9 @@ class PrecomputedFabric {
   // Single scattering under the normalised spherical Gaussian light G / M.
   [[nodiscard]] glm::vec3 single_sg(const ShadingPoint& at,
                                     const shading::SphericalGaussian& light) const;
+  // The same by other settings than its own.
+  [[nodiscard]] glm::vec3 single_sg(const ShadingPoint& at, const shading::SphericalGaussian& light,
+                                    const PrecomputedSettings& settings) const;
 
   // The parts of the above, for callers that bring their own visibility.
   [[nodiscard]] static glm::vec3 unoccluded_directional(const ShadingPoint& at, glm::vec3 omega_d);

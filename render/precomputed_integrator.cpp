@@ -145,7 +145,8 @@ PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_gaussian(const Shad
   const shading::SphericalGaussian local = gaussian_in(at.hit.fibre.to_flat, light);
   Scattered sum;
   if (single_wanted(scattering_) && lit(at.top_mm)) {
-    sum.single = at.fabric.single_sg(at.point, local) * light.irradiance;
+    sum.single = at.fabric.single_sg(at.point, local, settings_.value_or(at.fabric.settings())) *
+                 light.irradiance;
   }
   if (multiple_wanted(scattering_) && lit(neighbour(at, random))) {
     sum.multiple = multiple(at, index, harmonics_of_sg(local)) * light.irradiance;

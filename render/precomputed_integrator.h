@@ -26,6 +26,9 @@ class PrecomputedIntegrator : public Integrator {
                         const TermSources& sources = {});
   [[nodiscard]] EyeSample trace(const Ray& ray, core::Random& random) const override;
 
+  // Shades Gaussian lights by these settings in place of the fabrics' own.
+  void shade_by(const PrecomputedSettings& settings) { settings_ = settings; }
+
  private:
   struct Shaded;
   struct Arrival;
@@ -57,6 +60,7 @@ class PrecomputedIntegrator : public Integrator {
   Scattering scattering_;
   bool wants_shadow_;
   TermSources sources_;
+  std::optional<PrecomputedSettings> settings_;
   std::vector<std::size_t> first_fabric_;  // of each piece of cloth, among those of all pieces
   std::vector<TracedTerms> traced_;        // by fabric; empty when everything is looked up
   // [fabrics of all pieces, lights]: after the transfer, where the light's direction in the flat

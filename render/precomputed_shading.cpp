@@ -23,9 +23,14 @@ glm::vec3 PrecomputedFabric::single_directional(const ShadingPoint& at, glm::vec
 
 glm::vec3 PrecomputedFabric::single_sg(const ShadingPoint& at,
                                        const SphericalGaussian& light) const {
-  return shading::single_gaussian(
-      tables(), static_cast<int>(at.segment), at, at.bcsdf->lobes(), light,
-      {settings_.blend_low, settings_.blend_high, settings_.gamma_method});
+  return single_sg(at, light, settings_);
+}
+
+glm::vec3 PrecomputedFabric::single_sg(const ShadingPoint& at, const SphericalGaussian& light,
+                                       const PrecomputedSettings& settings) const {
+  return shading::single_gaussian(tables(), static_cast<int>(at.segment), at, at.bcsdf->lobes(),
+                                  light,
+                                  {settings.blend_low, settings.blend_high, settings.gamma_method});
 }
 
 CellRadiance PrecomputedFabric::light_cells(const ShVector& c_light) const {

@@ -176,9 +176,10 @@ void DeviceDrawing::put_on_device() {
   for (std::size_t cloth = 0; cloth < scene_.cloths.size(); ++cloth) {
     for (const int fabric : geometry.fabrics_of(cloth)) {
       const auto index = static_cast<std::size_t>(fabric);
-      parts.pieces.push_back({static_cast<int>(cloth), fabric, tables[index],
-                              scene_.cloths[cloth]->constant_rotation().has_value(),
-                              fabrics_[index]->precomputed()->settings()});
+      parts.pieces.push_back(
+          {static_cast<int>(cloth), fabric, tables[index],
+           scene_.cloths[cloth]->constant_rotation().has_value(),
+           settings_.shading.value_or(fabrics_[index]->precomputed()->settings())});
     }
   }
   on_device_ = std::make_unique<OnDevice>(

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "render/draw.h"
@@ -16,7 +17,8 @@ namespace weft::render::gpu {
 struct DeviceDrawSettings {
   DrawSettings picture;  // threads are of no meaning here
   Scattering scattering = Scattering::kAll;
-  std::uint32_t nearest_samples = 0;  // EyeView::nearest_samples
+  std::optional<PrecomputedSettings> shading;  // in place of the fabrics' own
+  std::uint32_t nearest_samples = 0;           // EyeView::nearest_samples
   // Most eye rays of one submission, and most pixels whose sums the device holds at once; 0: as
   // many as suit it. The picture does not depend on them.
   std::uint32_t most_rays = 0;
