@@ -97,6 +97,10 @@ RecordedPicture read_recipe(const std::string& path) {
   if (fabrics != attributes.end()) {
     recorded.fabrics = fabrics_in(fabrics->second);
   }
+  const auto device = attributes.find("weft.device");
+  if (device != attributes.end()) {
+    recorded.device = device->second;
+  }
   const auto pixels = attributes.find(kPixelsKey);
   if (pixels != attributes.end() && pixels->second == "float") {
     recorded.pixels = render::ExrPixels::kFloat;

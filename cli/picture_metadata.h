@@ -35,6 +35,7 @@ struct RecordedPicture {
   v1::Scene scene;
   FabricIdentities fabrics;
   render::ExrPixels pixels = render::ExrPixels::kHalf;
+  std::string device;  // that drew it: its name, or cpu; empty when the header does not say
 };
 
 // Throws core::Error: what read_exr throws, and kInvalidArgument when the header does not say how

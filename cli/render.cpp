@@ -117,6 +117,12 @@ void run(RenderOptions options) {
                         : render::Fabric::Wanted::kFibres);
   std::optional<render::NodeClient> node;
   if (!options.node.empty()) {
+    if (options.device != "auto") {
+      throw core::Error(core::Code::kInvalidArgument,
+                        "--device " + options.device +
+                            ": a render node draws on the device it was started with; leave "
+                            "--device away, or draw without --node");
+    }
     check_published(scene);
     node.emplace(options.node);
   }

@@ -65,6 +65,10 @@ v1::Scene described_scene(RenderOptions& options) {
     RecordedPicture recorded = read_recipe(options.again);
     scene = std::move(recorded.scene);
     options.floats = options.floats || recorded.pixels == render::ExrPixels::kFloat;
+    if (options.device == "auto" && options.node.empty() && !recorded.device.empty() &&
+        (recorded.device == "cpu" || render::draws_on_device(scene.integration()))) {
+      options.device = recorded.device;
+    }
   } else if (!options.scene.empty()) {
     scene = render::load_scene(options.scene);
   } else {

@@ -46,8 +46,8 @@ struct RenderOptions {
 void add_render_options(CLI::App& command, RenderOptions& options);
 
 // The scene as it will be drawn: the flags stand above the file (--scene, or the header of the
-// picture of --again), defaults are filled in. What such a header says of the pixels' type goes
-// into `options`. Throws core::Error.
+// picture of --again), defaults are filled in. What such a header says of the pixels' type and of
+// the device goes into `options`. Throws core::Error.
 [[nodiscard]] v1::Scene described_scene(RenderOptions& options);
 
 }  // namespace weft::cli

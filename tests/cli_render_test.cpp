@@ -26,8 +26,8 @@ class RenderCommand : public testing::Test {
 
   // weft render fibre.h5 --scene scene.textproto FURTHER
   [[nodiscard]] Finished render(const std::vector<std::string>& further) const {
-    std::vector<std::string> arguments{"render", folder_ / "fibre.h5", "--scene",
-                                       folder_ / "scene.textproto"};
+    std::vector<std::string> arguments{
+        "render", folder_ / "fibre.h5", "--scene", folder_ / "scene.textproto", "--device", "cpu"};
     arguments.insert(arguments.end(), further.begin(), further.end());
     return run_weft(folder_, arguments);
   }
@@ -69,7 +69,7 @@ TEST_F(RenderCommand, PassesEndInTheSamePicture) {
 TEST_F(RenderCommand, AnInterruptKeepsTheLastWholePass) {
   ChildProcess process(
       {program("weft"), "render", folder_ / "fibre.h5", "--scene", folder_ / "scene.textproto",
-       "--spp", "1048576", "--progressive", "-o", folder_ / "a.exr"},
+       "--device", "cpu", "--spp", "1048576", "--progressive", "-o", folder_ / "a.exr"},
       folder_ / "render.err", false);
   while (!std::filesystem::exists(folder_ / "a.exr") && !process.exit_code()) {
     static_cast<void>(process.wait(0.02));

@@ -127,6 +127,7 @@ class NodeTest : public testing::Test {
     options_.coordinator = catalogue_->address();
     options_.cache = folder_ / "cache";
     options_.threads = 2;
+    options_.device = "cpu";
   }
   ~NodeTest() override {
     node_.reset();
@@ -165,11 +166,12 @@ class NodeTest : public testing::Test {
   }
   // The same in this process.
   static void draw_here(const v1::Scene& scene, float transfer, bool progressive,
-                        render::PictureSink& sink) {
+                        render::PictureSink& sink, render::gpu::DeviceRenderer* device = nullptr) {
     std::shared_ptr<const render::Fabric> fabric = render::Fabric::from_database(
         lonely_fibre(transfer), render::Fabric::Wanted::kFibresAndTransfer);
     render::PictureSettings settings;
     settings.progressive = progressive;
+    settings.device = device;
     render::draw_pictures(
         scene, settings, [&](const std::string&) { return fabric; }, render::files_on_disk(), sink,
         [] { return false; });

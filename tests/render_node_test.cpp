@@ -39,6 +39,24 @@ TEST_F(NodeTest, DrawsWhatIsDrawnInProcessBitByBit) {
   EXPECT_GT(there.finished[0].drawing.cloth_mean.x, 0);
 }
 
+TEST_F(NodeTest, DrawsOnItsDeviceWhatTheDeviceDrawsInProcess) {
+  options_.device = "auto";
+  start();
+  KeptPictures there;
+  draw(small_scene("one@1"), false, there);
+  draw(small_scene("one@1"), true, there);
+  gpu::DeviceRenderer device("auto");
+  EXPECT_EQ(client().node().device(), device.info().name);
+  KeptPictures here;
+  draw_here(small_scene("one@1"), 0.5f, false, here, &device);
+  ASSERT_EQ(there.finished.size(), 2u);
+  for (const Picture& picture : there.finished) {
+    EXPECT_EQ(picture.device, device.info().name);
+    test::expect_same(picture, here.finished.at(0));
+  }
+  EXPECT_GT(here.finished.at(0).drawing.cloth_mean.x, 0);
+}
+
 TEST_F(NodeTest, SendsPassesAndTheFramesOfAnAnimation) {
   start();
   const v1::Scene scene = brightening(small_scene("one@1"));

@@ -102,6 +102,10 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--orders", options.node.orders_limit, "orders being drawn and waiting, at most")
       ->check(CLI::Range(1U, 64U))
       ->capture_default_str();
+  app.add_option("--device", options.node.device,
+                 "what draws the precomputed integrator: auto (a GPU, else the software device), "
+                 "cpu, or an index or name of 'weft render --list-devices'")
+      ->capture_default_str();
   app.add_option("--threads", options.node.threads, "threads; default: all the machine has")
       ->check(CLI::Range(1U, 1024U));
   app.add_option("--drain", options.drain_seconds,
@@ -143,6 +147,8 @@ int main(int argc, char** argv) {
         return 4;
       case core::Code::kUnavailable:
         return 5;
+      case core::Code::kNotFound:
+        return 3;
       default:
         return 1;
     }

@@ -95,6 +95,7 @@ v1::PictureHeader header_of(const Picture& picture, bool finished) {
   header.set_cloth_share(drawing.cloth_share);
   header.set_load_seconds(picture.load_seconds);
   header.set_draw_seconds(picture.draw_seconds);
+  header.set_device(picture.device);
   return header;
 }
 
@@ -160,6 +161,7 @@ Picture PictureReceiver::picture() const {
   picture.samples_per_pixel = header_.samples_per_pixel();
   picture.load_seconds = header_.load_seconds();
   picture.draw_seconds = header_.draw_seconds();
+  picture.device = header_.device();
   return picture;
 }
 

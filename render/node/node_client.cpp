@@ -122,6 +122,7 @@ class NodeClient::Reception {
     frame_.index = started.index();
     frame_.count = started.count();
     frame_.scene = scene_at_frame(scene_, started.frame());
+    frame_.scene.mutable_integration()->set_environment_lights(started.environment_lights());
     frame_.remarks.assign(started.remarks().begin(), started.remarks().end());
     fabrics_.clear();
     for (const v1::RenderedFabric& fabric : started.fabrics()) {

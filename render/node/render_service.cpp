@@ -64,6 +64,7 @@ class RenderService::Conversation : public PictureSink {
     started.set_frame(frame.number);
     started.set_index(frame.index);
     started.set_count(frame.count);
+    started.set_environment_lights(frame.scene.integration().environment_lights());
     for (const std::string& remark : frame.remarks) {
       started.add_remarks(remark);
     }
@@ -123,7 +124,12 @@ RenderService::RenderService(const RenderNodeOptions& options)
       queue_(options.orders_limit),
       fabrics_(options.coordinator,
                client::FabricCache(options.cache / "fabrics", options.cache_limit_bytes),
-               options.memory_limit_bytes) {}
+               options.memory_limit_bytes) {
+  if (options.device != "cpu") {
+    device_ = std::make_unique<gpu::DeviceRenderer>(options.device);
+    device_name_ = device_->info().name;
+  }
+}
 
 void RenderService::draw(const v1::RenderOrder& order, Conversation& conversation) {
   const v1::Scene& scene = order.scene();
@@ -170,6 +176,7 @@ void RenderService::draw(const v1::RenderOrder& order, Conversation& conversatio
   PictureSettings settings;
   settings.threads = options_.threads;
   settings.progressive = order.progressive();
+  settings.device = device_.get();
   settings.environment_cache = options_.cache / "environments";
   draw_pictures(scene, settings, fabric_of, attachments.source(), conversation, should_stop);
 }
@@ -220,6 +227,7 @@ grpc::Status RenderService::GetNode(grpc::ServerContext* /*context*/,
   }
   response->set_cache_bytes(fabrics_.cache().size_bytes());
   response->set_cache_limit_bytes(fabrics_.cache().limit_bytes());
+  response->set_device(device_name_);
   return grpc::Status::OK;
 }
 

@@ -3,9 +3,11 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "proto/weft/v1/render.grpc.pb.h"
+#include "render/gpu/device_renderer.h"
 #include "render/node/fabric_store.h"
 #include "render/node/render_queue.h"
 
@@ -17,12 +19,14 @@ struct RenderNodeOptions {
   std::uint64_t cache_limit_bytes = std::uint64_t{16} << 30;
   std::uint64_t memory_limit_bytes = std::uint64_t{4} << 30;
   std::uint32_t orders_limit = 8;  // being drawn and waiting
+  std::string device = "auto";     // as DeviceRenderer takes it; "cpu": none
   unsigned threads = 0;            // 0: as many as the machine has
 };
 
 // RenderService as render.proto has it. Any thread may call.
 class RenderService final : public v1::RenderService::Service {
  public:
+  // Opens the device. Throws what gpu::DeviceRenderer throws.
   explicit RenderService(const RenderNodeOptions& options);
 
   grpc::Status Render(
@@ -44,6 +48,9 @@ class RenderService final : public v1::RenderService::Service {
   RenderNodeOptions options_;
   RenderQueue queue_;
   FabricStore fabrics_;
+  // Keeps what it has of fabrics between orders; null: the CPU draws. Of the order that is drawn.
+  std::unique_ptr<gpu::DeviceRenderer> device_;
+  std::string device_name_ = "cpu";
   std::atomic<bool> aborted_ = false;
 };
 
