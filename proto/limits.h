@@ -20,7 +20,6 @@ inline constexpr std::size_t kErrorTextLimitBytes = 4096;
 inline constexpr std::size_t kCommentLimitBytes = 1024;
 inline constexpr std::uint32_t kListLimit = 1000;
 
-
 // Of render.proto.
 inline constexpr int kAttachmentsLimit = 20'000;
 inline constexpr std::uint64_t kAttachmentBytesLimit = std::uint64_t{1} << 30;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
@@ -313,7 +314,7 @@ TEST(ReadPattern, MistakesInASceneAreReportedAtTheirPlace) {
            {"pattern { fabrics: \"a\" rows { row: \"00\" row: \"0\" } }", "equal length"},
            {"pattern { fabrics: \"a\" rows { row: \"-\" } }", "written '-'"},
            {"fabric: \"b\" pattern { fabrics: \"a\" rows { row: \"0\" } }", "beside a pattern"}}) {
-    const std::string message = complaint("cloths { " + pattern_text + flat);
+    const std::string message = complaint(fmt::format("cloths {{ {}{}", pattern_text, flat));
     EXPECT_NE(message.find(part), std::string::npos) << pattern_text << message;
     EXPECT_NE(message.find("cloths[0]."), std::string::npos) << message;
   }
