@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "core/half.h"
 #include "shading/bcsdf_sh.h"
 #include "storage/fabric_database.h"
@@ -31,7 +33,8 @@ inline storage::FabricDatabase lonely_fibre(float transfer) {
   db.strand_radius_mm = {0.05f};
   db.points_mm = {0, 5, 0, 5, 5, 0, 10, 5, 0};
   db.materials = {lonely_material()};
-  db.c_s = shading::bcsdf_sh_table(lonely_material(), 5);
+  static const std::vector<float> table = shading::bcsdf_sh_table(lonely_material(), 5);
+  db.c_s = table;
   db.mean_free_path_mm = 0.1f;
   db.sigma_shadow_mm = 0.5f;
   db.cell_of_segment = {0, 0};
