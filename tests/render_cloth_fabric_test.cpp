@@ -231,7 +231,7 @@ TEST(ClothFabric, AShellShowsThePatternOfTheFlatFabric) {
 v1::Pattern rows_of(const std::vector<std::string>& rows, int fabrics) {
   v1::Pattern result;
   for (int k = 0; k < fabrics; ++k) {
-    result.add_fabrics("f" + std::to_string(k));
+    result.add_fabrics(fmt::format("f{}", k));
   }
   for (const std::string& row : rows) {
     result.mutable_rows()->add_row(row);
