@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -77,7 +78,10 @@ INSTANTIATE_TEST_SUITE_P(Shading, Parity,
                          testing::Values(Case{0, 1e-3, 13}, Case{1, 1e-2, 11}, Case{2, 1e-3, 16},
                                          Case{3, 1e-3, 15}, Case{4, 1e-3, 9}, Case{5, 1e-3, 7},
                                          Case{6, 1e-3, 16}, Case{7, 1e-2, 36}, Case{8, 1e-2, 38},
-                                         Case{9, 1e-2, 36}, Case{10, 1e-2, 38}, Case{11, 1e-3, 4}));
+                                         Case{9, 1e-2, 36}, Case{10, 1e-2, 38}, Case{11, 1e-3, 4}),
+                         [](const auto& about) {
+                           return fmt::format("Group{}", about.param.which);
+                         });
 
 TEST_P(Parity, OfDeviceAndHost) {
   const auto device = Device::open("", {.validation = Validation::kOn});
