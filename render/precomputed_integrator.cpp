@@ -41,6 +41,14 @@ struct PrecomputedIntegrator::Arrival {
   std::optional<glm::dvec3> point_mm;
 };
 
+// Light that comes from a drawn direction.
+struct PrecomputedIntegrator::Drawn {
+  LightSample sample;
+  glm::vec3 omega_d;  // in the flat fabric
+  glm::vec3 weight;   // radiance over density
+  Arrival arrival;
+};
+
 // What one light sends to the eye.
 struct PrecomputedIntegrator::Scattered {
   glm::vec3 single{0, 0, 0};
@@ -154,36 +162,45 @@ PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_gaussian(const Shad
   return sum;
 }
 
-// One direction towards the light, shaded as a directional light.
-PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_drawn(const Shaded& at,
-                                                                   std::size_t index,
-                                                                   core::Random& random) const {
+// A direction towards a light; nothing where it gives none or comes from below the flat fabric.
+std::optional<PrecomputedIntegrator::Drawn> PrecomputedIntegrator::draw_direction(
+    const Shaded& at, std::size_t index, core::Random& random) const {
   const double u1 = random.uniform_double();
   const double u2 = random.uniform_double();
   const LightSample sample = sample_light(scene_.lights[index], at.hit.fibre.world_mm, u1, u2);
   const glm::vec3 omega_d = glm::normalize(at.hit.fibre.to_flat * glm::vec3(sample.direction));
   if (sample.radiance == glm::vec3(0) || !(omega_d.z > 0)) {
-    return {};
+    return std::nullopt;
   }
   Arrival arrival{sample.direction, std::nullopt};
   if (sample.distance_mm < kInfinity) {
     arrival.point_mm = at.hit.fibre.world_mm + sample.distance_mm * sample.direction;
   }
-  const glm::vec3 weight = sample.radiance / static_cast<float>(sample.pdf);
+  return Drawn{sample, omega_d, sample.radiance / static_cast<float>(sample.pdf), arrival};
+}
+
+// One direction towards the light, shaded as a directional light.
+PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_drawn(const Shaded& at,
+                                                                   std::size_t index,
+                                                                   core::Random& random) const {
+  const std::optional<Drawn> drawn = draw_direction(at, index, random);
+  if (!drawn) {
+    return {};
+  }
   Scattered sum;
   if (single_wanted(scattering_)) {
-    glm::vec3 single = at.fabric.single_directional(at.point, omega_d);
-    if (!sample.one_direction) {  // the other part comes by directions drawn from the fibre
-      const auto other =
-          static_cast<double>(at.point.bcsdf->pdf(at.point.to_fibre * omega_d, at.point.omega_o));
-      single *= static_cast<float>(sample.pdf / (sample.pdf + other));
+    glm::vec3 single = at.fabric.single_directional(at.point, drawn->omega_d);
+    if (!drawn->sample.one_direction) {  // the other part comes by directions drawn from the fibre
+      const auto other = static_cast<double>(
+          at.point.bcsdf->pdf(at.point.to_fibre * drawn->omega_d, at.point.omega_o));
+      single *= static_cast<float>(drawn->sample.pdf / (drawn->sample.pdf + other));
     }
-    if (single != glm::vec3(0) && reaches(at.top_mm, arrival)) {
-      sum.single = single * weight;
+    if (single != glm::vec3(0) && reaches(at.top_mm, drawn->arrival)) {
+      sum.single = single * drawn->weight;
     }
   }
-  if (multiple_wanted(scattering_) && reaches(neighbour(at, random), arrival)) {
-    sum.multiple = multiple(at, index, harmonics_of_directional(omega_d)) * weight;
+  if (multiple_wanted(scattering_) && reaches(neighbour(at, random), drawn->arrival)) {
+    sum.multiple = multiple(at, index, harmonics_of_directional(drawn->omega_d)) * drawn->weight;
   }
   return sum;
 }
@@ -222,25 +239,18 @@ glm::vec3 PrecomputedIntegrator::from_fibre_direction(const Shaded& at, const Li
 PrecomputedIntegrator::Scattered PrecomputedIntegrator::from_traced(const Shaded& at,
                                                                     std::size_t index,
                                                                     core::Random& random) const {
-  const double u1 = random.uniform_double();
-  const double u2 = random.uniform_double();
-  const LightSample sample = sample_light(scene_.lights[index], at.hit.fibre.world_mm, u1, u2);
-  const glm::vec3 omega_d = glm::normalize(at.hit.fibre.to_flat * glm::vec3(sample.direction));
-  if (sample.radiance == glm::vec3(0) || !(omega_d.z > 0)) {
+  const std::optional<Drawn> drawn = draw_direction(at, index, random);
+  if (!drawn) {
     return {};
   }
-  Arrival arrival{sample.direction, std::nullopt};
-  if (sample.distance_mm < kInfinity) {
-    arrival.point_mm = at.hit.fibre.world_mm + sample.distance_mm * sample.direction;
-  }
   const TracedTerms& traced = traced_[fabric_index(at.hit)];
-  const glm::vec3 weight = sample.radiance / static_cast<float>(sample.pdf);
   Scattered sum;
-  if (single_wanted(scattering_) && reaches(at.top_mm, arrival)) {
-    sum.single = traced.single(at.point, omega_d) * weight;
+  if (single_wanted(scattering_) && reaches(at.top_mm, drawn->arrival)) {
+    sum.single = traced.single(at.point, drawn->omega_d) * drawn->weight;
   }
-  if (multiple_wanted(scattering_) && reaches(neighbour(at, random), arrival)) {
-    sum.multiple = traced.multiple(at.point, omega_d, sources_.multiple, random) * weight;
+  if (multiple_wanted(scattering_) && reaches(neighbour(at, random), drawn->arrival)) {
+    sum.multiple =
+        traced.multiple(at.point, drawn->omega_d, sources_.multiple, random) * drawn->weight;
   }
   return sum;
 }

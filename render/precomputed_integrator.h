@@ -32,6 +32,7 @@ class PrecomputedIntegrator : public Integrator {
  private:
   struct Shaded;
   struct Arrival;
+  struct Drawn;
   struct Scattered;
   [[nodiscard]] Scattered from_light(const Shaded& at, std::size_t light,
                                      core::Random& random) const;
@@ -43,6 +44,8 @@ class PrecomputedIntegrator : public Integrator {
                                         core::Random& random) const;
   [[nodiscard]] Scattered from_drawn(const Shaded& at, std::size_t light,
                                      core::Random& random) const;
+  [[nodiscard]] std::optional<Drawn> draw_direction(const Shaded& at, std::size_t light,
+                                                    core::Random& random) const;
   [[nodiscard]] glm::vec3 from_fibre_direction(const Shaded& at, const Light& light,
                                                core::Random& random) const;
   [[nodiscard]] bool reaches(const glm::dvec3& from_mm, const Arrival& arrival) const;

@@ -5,70 +5,19 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "core/half.h"
 #include "render/draw.h"
 #include "render/environment_cache.h"
 #include "render/flat_cloth.h"
 #include "render/path_integrator.h"
 #include "render/precomputed_integrator.h"
 #include "render/shell_cloth.h"
-#include "shading/bcsdf_sh.h"
+#include "tests/render_lonely_fibre.h"
 
 namespace weft::render {
 namespace {
 
-constexpr std::size_t kHarmonics = 36;
-
-shading::FibreMaterial material() {
-  shading::FibreMaterial result;
-  result.c_r = {0.3f, 0.2f, 0.1f};
-  result.c_tt = {0.6f, 0.5f, 0.4f};
-  result.beta_r = 0.12f;
-  result.beta_tt = 0.17f;
-  result.gamma_tt = 0.35f;
-  return result;
-}
-
-// The database of one straight fibre along x in a wide tile: every segment sees everything, and
-// `transfer` of constant light arrives as constant light.
-storage::FabricDatabase lonely_fibre(float transfer) {
-  storage::FabricDatabase db;
-  db.size_mm = {10, 10};
-  db.z_bounds_mm = {-0.05f, 0.05f};
-  db.material_names = {"grey"};
-  db.yarn_names = {"yarn"};
-  db.threads = {0, 3, 0};
-  db.strands = {3, 0, 0};
-  db.strand_periods = {1, 0};
-  db.strand_radius_mm = {0.05f};
-  db.points_mm = {0, 5, 0, 5, 5, 0, 10, 5, 0};
-  db.materials = {material()};
-  db.c_s = shading::bcsdf_sh_table(material(), 5);
-  db.sigma_shadow_mm = 0.5f;
-  db.cell_of_segment = {0, 0};
-  db.cell_coordinates = {0, 0, 0};
-  db.sh_order = 5;
-  db.cell_paths = {1};
-  db.transfer.assign(3 * kHarmonics * kHarmonics, 0.0f);
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    db.transfer[channel * kHarmonics * kHarmonics] = transfer;
-  }
-  db.transfer_se.assign(db.transfer.size(), 0.0f);
-  db.visibility_resolution = 16;
-  db.pca_components = 1;
-  db.ssdf_mean.assign(256, 3.0f);
-  db.ssdf_basis.assign(256, 0.0f);
-  db.ssdf.assign(2, 0);
-  db.sg_count = 1;
-  db.sg_sharpness = 128;
-  db.ssg.assign(2, 0);
-  db.ssg_rotation.assign(2, 0);
-  db.open_share.assign(2, core::half_from_float(1));
-  return db;
-}
-
 std::shared_ptr<const Fabric> fabric_with(float transfer) {
-  return Fabric::from_database(lonely_fibre(transfer), Fabric::Wanted::kFibresAndTransfer);
+  return Fabric::from_database(test::lonely_fibre(transfer), Fabric::Wanted::kFibresAndTransfer);
 }
 
 FlatPlacement around_the_fibre() {
@@ -162,8 +111,8 @@ TEST(PrecomputedIntegrator, ConstantTransferShowsTheAdjointAlbedo) {
   const PrecomputedIntegrator integrator(scene, Scattering::kMultipleOnly);
   const Drawing drawing = drawing_of(scene, integrator, 2);
   const glm::dvec3 towards_eye = glm::normalize(glm::dvec3(1, 0.5, 8) - glm::dvec3(3.2, 0, 0));
-  const glm::vec3 expected =
-      shading::FibreBcsdf(material()).adjoint_albedo(static_cast<float>(std::asin(towards_eye.x)));
+  const glm::vec3 expected = shading::FibreBcsdf(test::lonely_material())
+                                 .adjoint_albedo(static_cast<float>(std::asin(towards_eye.x)));
   for (int c = 0; c < 3; ++c) {
     EXPECT_NEAR(drawing.cloth_mean[c], expected[c], 2e-3 * expected[c]);
   }
