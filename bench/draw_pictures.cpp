@@ -90,6 +90,7 @@ Drawn draw(const PictureRequest& request, const render::Scene& scene, Drawer& dr
     const core::Stopwatch watch;
     render::gpu::DeviceDrawSettings on_device;
     on_device.picture = settings;
+    on_device.scattering = render::scattering_of(request.scene.integration());
     on_device.nearest_samples = request.nearest_samples;
     render::gpu::DeviceDrawing growing(*drawer.renderer, scene, on_device);
     return grow(
