@@ -148,7 +148,6 @@ void apply_quality(v1::FabricDescription& description) {
   v1::Precompute& settings = *description.mutable_precompute();
   v1::Exemplar& exemplar = *description.mutable_exemplar();
   if (settings.quality() == v1::QUALITY_PREVIEW) {
-    settings.set_sh_order(std::min(settings.sh_order(), 4U));
     settings.set_paths_per_cell(std::min(settings.paths_per_cell(), 4096U));
     settings.set_visibility_resolution(std::min(settings.visibility_resolution(), 128U));
     settings.set_pca_sample_segments(std::min(settings.pca_sample_segments(), 1024U));

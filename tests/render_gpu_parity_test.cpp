@@ -71,6 +71,7 @@ struct Case {
   double term_size;
   int numbers;  // that vary with the input
 };
+void PrintTo(const Case& test, std::ostream* out) { *out << "group " << test.which; }
 
 class Parity : public testing::TestWithParam<Case> {};
 
