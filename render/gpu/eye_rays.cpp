@@ -23,9 +23,10 @@ static_assert(sizeof(EyeTask) == 104 && offsetof(EyeTask, seed) == 64 &&
 
 constexpr std::uint32_t kBuffers = 16;    // of eye_rays.comp
 constexpr std::uint32_t kGroupRays = 64;  // local_size_x of eye_rays.comp
-// A ray that is not finished after so many rounds of kEyeSteps runs through cloth that has nothing
-// in its way; it keeps what it has met before.
-constexpr int kMaxRounds = 200;
+// A ray that is not finished after so many rounds of kEyeSteps, about as many steps as the CPU
+// takes, runs through cloth that has nothing in its way, or in circles through tetrahedra that are
+// turned inside out; it keeps what it has met before.
+constexpr int kMaxRounds = 16;
 
 }  // namespace
 
