@@ -25,11 +25,13 @@ for fabric in $fabrics; do
   fi
 done
 
-# draw NAME FABRIC SIZE SAMPLES < SCENE: one picture; what is there already is not drawn again.
+# draw NAME FABRIC SIZE SAMPLES [FLAG...] < SCENE: one picture; what is there already is not drawn again.
 draw() {
-  cat > "$pictures/$1.textproto"
-  "$weft" render "$databases/$2.h5" --scene "$pictures/$1.textproto" --size "$3" --spp "$4" \
-    -o "$pictures/$1.exr" --png "$root/docs/gallery/$1.png" --resume
+  name=$1 fabric=$2 size=$3 samples=$4
+  shift 4
+  cat > "$pictures/$name.textproto"
+  "$weft" render "$databases/$fabric.h5" --scene "$pictures/$name.textproto" --size "$size" \
+    --spp "$samples" -o "$pictures/$name.exr" --png "$root/docs/gallery/$name.png" --resume "$@"
 }
 
 key='lights { sg { towards { x: -0.6 y: -0.45 z: 0.75 } sharpness: 150 irradiance { r: 3 g: 3 b: 3 } } }'
@@ -81,7 +83,8 @@ SCENE
 
 # A sky, drawn by directions and as spherical Gaussians that were fitted to it.
 sky='lights { environment { exr_file: "sky.exr" } }'
-draw sky_drawn shot_silk_a 256x256 16 << SCENE
+# (A device has no other way than the second.)
+draw sky_drawn shot_silk_a 256x256 16 --device cpu << SCENE
 $view $sky $drape
 SCENE
 draw sky_fitted shot_silk_a 256x256 8 << SCENE
