@@ -14,7 +14,7 @@
 #include "render/shell_cloth.h"
 #include "tests/transport_tiles.h"
 
-// Fabrics and meshes built by hand for the tests of render/gpu.
+// Fabrics and meshes built by hand for tests.
 namespace weft::test {
 
 // A sheet of n x n squares over [-half, half]^2, its texture coordinates the millimetres of the

@@ -17,41 +17,18 @@
 #include "render/path_integrator.h"
 #include "render/shell_cloth.h"
 #include "render/shell_geometry.h"
+#include "tests/render_cloths.h"
 #include "tests/transport_tiles.h"
 
 namespace weft::render {
 namespace {
 
+using test::sheet;
+
 glm::dmat3 rotation_about_x(double angle) {
   const double c = std::cos(angle);
   const double s = std::sin(angle);
   return {glm::dvec3(1, 0, 0), glm::dvec3(0, c, s), glm::dvec3(0, -s, c)};
-}
-
-// A sheet of n x n squares over [-half, half]^2, its texture coordinates the millimetres of the
-// sheet; `place` puts its points into the world.
-template <class Place>
-ObjMesh sheet(int n, double half, const Place& place) {
-  ObjMesh mesh;
-  const auto at = [&](int i) { return half * (2.0 * i / n - 1); };
-  for (int y = 0; y <= n; ++y) {
-    for (int x = 0; x <= n; ++x) {
-      mesh.points.push_back(place(glm::dvec2(at(x), at(y))));
-    }
-  }
-  for (int y = 0; y < n; ++y) {
-    for (int x = 0; x < n; ++x) {
-      const auto point = [&](int i, int j) {
-        return static_cast<std::uint32_t>((y + j) * (n + 1) + x + i);
-      };
-      const auto texture = [&](int i, int j) { return glm::dvec2(at(x + i), at(y + j)); };
-      mesh.triangles.push_back(
-          {{point(0, 0), point(1, 0), point(1, 1)}, {texture(0, 0), texture(1, 0), texture(1, 1)}});
-      mesh.triangles.push_back(
-          {{point(0, 0), point(1, 1), point(0, 1)}, {texture(0, 0), texture(1, 1), texture(0, 1)}});
-    }
-  }
-  return mesh;
 }
 
 shading::FibreMaterial material() {
