@@ -40,12 +40,11 @@ void apply_size(const std::string& text, v1::Picture& picture) {
 }
 
 v1::TermSource named_source(const std::string& name, v1::TermSource otherwise) {
-  static const std::map<std::string, v1::TermSource> kSources{
-      {"database", v1::TERM_SOURCE_DATABASE},
-      {"cell", v1::TERM_SOURCE_CELL},
-      {"segment", v1::TERM_SOURCE_SEGMENT}};
-  const auto found = kSources.find(name);
-  return found == kSources.end() ? otherwise : found->second;
+  static const std::map<std::string, v1::TermSource> sources{{"database", v1::TERM_SOURCE_DATABASE},
+                                                             {"cell", v1::TERM_SOURCE_CELL},
+                                                             {"segment", v1::TERM_SOURCE_SEGMENT}};
+  const auto found = sources.find(name);
+  return found == sources.end() ? otherwise : found->second;
 }
 
 std::string mistake_in_layers(const std::string& text) {
@@ -111,7 +110,9 @@ v1::Scene described_scene(RenderOptions& options) {
   return scene;
 }
 
-void add_render_options(CLI::App& command, RenderOptions& options) {
+namespace {
+
+void add_file_options(CLI::App& command, RenderOptions& options) {
   command.add_option("fabric", options.fabric,
                      "Database, published version or description; not needed with --again");
   command
@@ -146,6 +147,9 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
       ->envname("WEFT_RENDER_NODE")
       ->check(CLI::Validator(v1::mistake_in_address, "", "address"))
       ->excludes(resume);
+}
+
+void add_drawing_options(CLI::App& command, RenderOptions& options) {
   command
       .add_option("--integrator", options.integrator,
                   "path: every fibre, all bounces; precomputed: the database's transfer; dual: "
@@ -190,6 +194,13 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
       ->check(CLI::IsMember({"database", "cell", "segment"}));
   add_coordinator_option(command, options.coordinator);
   command.add_flag("--json", options.wants_json, "Print one JSON value on stdout");
+}
+
+}  // namespace
+
+void add_render_options(CLI::App& command, RenderOptions& options) {
+  add_file_options(command, options);
+  add_drawing_options(command, options);
 }
 
 }  // namespace weft::cli

@@ -83,19 +83,22 @@ struct Needs {
   std::uint64_t cell_entries = 0;
 };
 
+// Adds what one fabric of a piece needs; light reaches the cells of level pieces once.
+void add_needs(Needs& needs, const PrecomputedFabric* fabric, bool is_level) {
+  CHECK(fabric != nullptr);
+  const auto harmonics = static_cast<std::uint32_t>(fabric->tables().sizes.harmonics);
+  needs.harmonics = std::max(needs.harmonics, harmonics);
+  if (is_level) {
+    needs.cell_entries += std::uint64_t{3} * harmonics * fabric->database().cell_paths.size();
+  }
+}
+
 Needs needs_of(const Scene& scene, const GeometryArrays& geometry) {
   Needs needs;
   for (std::size_t cloth = 0; cloth < scene.cloths.size(); ++cloth) {
+    const bool is_level = scene.cloths[cloth]->constant_rotation().has_value();
     for (const int index : geometry.fabrics_of(cloth)) {
-      const Fabric* fabric = geometry.sources[static_cast<std::size_t>(index)];
-      CHECK(fabric->precomputed() != nullptr);
-      const auto harmonics =
-          static_cast<std::uint32_t>(fabric->precomputed()->tables().sizes.harmonics);
-      needs.harmonics = std::max(needs.harmonics, harmonics);
-      if (scene.cloths[cloth]->constant_rotation()) {
-        needs.cell_entries +=
-            std::uint64_t{3} * harmonics * fabric->precomputed()->database().cell_paths.size();
-      }
+      add_needs(needs, geometry.sources[static_cast<std::size_t>(index)]->precomputed(), is_level);
     }
   }
   return needs;

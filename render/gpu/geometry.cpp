@@ -279,7 +279,7 @@ std::vector<int> GeometryArrays::fabrics_of(std::size_t cloth) const {
     return {piece.fabric};
   }
   const auto first = patterns.begin() + piece.first_pattern;
-  std::vector<int> shown(first, first + piece.pattern_width * piece.pattern_height);
+  std::vector<int> shown(first, first + std::ptrdiff_t{piece.pattern_width} * piece.pattern_height);
   std::sort(shown.begin(), shown.end());
   shown.erase(std::unique(shown.begin(), shown.end()), shown.end());
   return shown;

@@ -62,11 +62,12 @@ std::uint64_t BatchBuffers::size_bytes(std::uint64_t capacity, std::uint64_t pix
          pixels * sizeof(shading::DevicePixel);
 }
 
-BatchBuffers::BatchBuffers(Device& device, std::uint32_t capacity_, std::uint32_t tile_pixels,
+BatchBuffers::BatchBuffers(Device& device, std::uint32_t most_samples, std::uint32_t tile_pixels,
                            std::uint32_t harmonics)
-    : capacity(capacity_),
-      samples(device.allocate(sizeof(shading::DeviceSample) * std::uint64_t{capacity_}, "samples")),
-      arriving(device.allocate(sizeof(float) * std::uint64_t{3} * harmonics * capacity_,
+    : capacity(most_samples),
+      samples(
+          device.allocate(sizeof(shading::DeviceSample) * std::uint64_t{most_samples}, "samples")),
+      arriving(device.allocate(sizeof(float) * std::uint64_t{3} * harmonics * most_samples,
                                "arriving light")),
       pixels(device.allocate(sizeof(shading::DevicePixel) * std::uint64_t{tile_pixels},
                              "sums of pixels")) {}

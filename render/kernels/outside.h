@@ -71,8 +71,8 @@ SHARED float triangle_distance(LocalRay ray, DeviceOuterFace face) {
   float u = dot(from, p) * inverse;
   vec3 q = cross(from, ab);
   float v = dot(ray.direction, q) * inverse;
-  const float kOut = -1e-5f;
-  if (!(u >= kOut && v >= kOut && u + v <= 1.0f - kOut)) {
+  const float outside = -1e-5f;
+  if (!(u >= outside && v >= outside && u + v <= 1.0f - outside)) {
     return kFarMm;
   }
   return dot(ac, q) * inverse;

@@ -115,7 +115,7 @@ SHARED TopPoint top_point_of_shell(Geometry g, DeviceCloth piece, int place, vec
   top.exists = false;
   top.world_mm = vec3(0.0f, 0.0f, 0.0f);
   // As far out of a border as rounding may have it.
-  const float kOnEdge = 1e-5f;
+  const float edge_width = 1e-5f;
   int triangle = place / 3;
   int before = -1;
   for (int step = 0; step < kMaxTriangleSteps && triangle >= 0; ++step) {
@@ -133,7 +133,7 @@ SHARED TopPoint top_point_of_shell(Geometry g, DeviceCloth piece, int place, vec
       across = here.across_1;
     }
     // A point on an edge would be sent to and fro by rounding.
-    bool on_edge = lowest > -kOnEdge && (across < 0 || across == before);
+    bool on_edge = lowest > -edge_width && (across < 0 || across == before);
     if (lowest >= 0.0f || on_edge) {
       top.exists = true;
       top.world_mm =
