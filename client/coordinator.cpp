@@ -3,27 +3,15 @@
 #include <random>
 
 #include <fmt/format.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 
+#include "client/channel.h"
 #include "core/error.h"
-#include "proto/address.h"
-#include "proto/limits.h"
 #include "proto/status.h"
 
 namespace weft::client {
 
-Coordinator::Coordinator(const std::string& address) : address_(address) {
-  const std::string mistake = v1::mistake_in_address(address);
-  if (!mistake.empty()) {
-    throw core::Error(core::Code::kInvalidArgument, mistake);
-  }
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
-  arguments.SetMaxSendMessageSize(v1::kMessageLimitBytes);
-  // A proxy between a person and a coordinator on the same machine is never meant.
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+Coordinator::Coordinator(const std::string& address)
+    : address_(address), channel_(open_channel(address)) {
   jobs_ = v1::JobService::NewStub(channel_);
   workers_ = v1::WorkersService::NewStub(channel_);
   catalogue_ = v1::CatalogueService::NewStub(channel_);

@@ -8,13 +8,11 @@
 #include <vector>
 
 #include <grpcpp/client_context.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 
+#include "client/channel.h"
 #include "client/coordinator.h"
 #include "core/digest.h"
 #include "core/error.h"
-#include "proto/address.h"
 #include "proto/limits.h"
 #include "proto/status.h"
 #include "render/animation.h"
@@ -158,17 +156,8 @@ class NodeClient::Reception {
   std::size_t frames_finished_ = 0;
 };
 
-NodeClient::NodeClient(const std::string& address) : address_(address) {
-  const std::string mistake = v1::mistake_in_address(address);
-  if (!mistake.empty()) {
-    throw core::Error(core::Code::kInvalidArgument, mistake);
-  }
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
-  arguments.SetMaxSendMessageSize(v1::kMessageLimitBytes);
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+NodeClient::NodeClient(const std::string& address)
+    : address_(address), channel_(client::open_channel(address, kKeepaliveMs)) {
   stub_ = v1::RenderService::NewStub(channel_);
 }
 
