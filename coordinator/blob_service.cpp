@@ -7,9 +7,9 @@
 
 namespace weft::coordinator {
 
-grpc::Status BlobService::Read(grpc::ServerContext* /*context*/, const v1::ReadRequest* request,
+grpc::Status BlobService::Read(grpc::ServerContext* context, const v1::ReadRequest* request,
                                grpc::ServerWriter<v1::ReadResponse>* writer) {
-  return answer("Read", [&]() -> grpc::Status {
+  return answer(*context, "BlobService.Read", [&]() -> grpc::Status {
     const core::Digest digest = digest_from(request->digest(), "digest");
     const bool was_there = scheduler_.blobs().has(digest);
     const std::optional<std::string> blob = scheduler_.blobs().get(digest);
@@ -41,10 +41,10 @@ grpc::Status BlobService::Read(grpc::ServerContext* /*context*/, const v1::ReadR
   });
 }
 
-grpc::Status BlobService::Write(grpc::ServerContext* /*context*/,
+grpc::Status BlobService::Write(grpc::ServerContext* context,
                                 grpc::ServerReader<v1::WriteRequest>* reader,
                                 v1::WriteResponse* /*response*/) {
-  return answer("Write", [&]() -> grpc::Status {
+  return answer(*context, "BlobService.Write", [&]() -> grpc::Status {
     v1::WriteRequest request;
     if (!reader->Read(&request)) {
       return {grpc::StatusCode::INVALID_ARGUMENT, "the stream has no message"};

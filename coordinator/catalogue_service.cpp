@@ -8,10 +8,10 @@
 
 namespace weft::coordinator {
 
-grpc::Status CatalogueService::ListFabrics(grpc::ServerContext* /*context*/,
+grpc::Status CatalogueService::ListFabrics(grpc::ServerContext* context,
                                            const v1::ListFabricsRequest* /*request*/,
                                            v1::ListFabricsResponse* response) {
-  return answer("ListFabrics", [&] {
+  return answer(*context, "CatalogueService.ListFabrics", [&] {
     for (const VersionRecord& latest : catalogue_.latest_versions()) {
       v1::Fabric& fabric = *response->add_fabrics();
       fabric.set_name(latest.fabric);
@@ -22,10 +22,10 @@ grpc::Status CatalogueService::ListFabrics(grpc::ServerContext* /*context*/,
   });
 }
 
-grpc::Status CatalogueService::ListVersions(grpc::ServerContext* /*context*/,
+grpc::Status CatalogueService::ListVersions(grpc::ServerContext* context,
                                             const v1::ListVersionsRequest* request,
                                             v1::ListVersionsResponse* response) {
-  return answer("ListVersions", [&] {
+  return answer(*context, "CatalogueService.ListVersions", [&] {
     (void)catalogue_.find(request->fabric() + "@latest");  // says it well when there is none
     for (const VersionRecord& version : catalogue_.versions(request->fabric())) {
       *response->add_versions() = message_of(version);
@@ -34,19 +34,19 @@ grpc::Status CatalogueService::ListVersions(grpc::ServerContext* /*context*/,
   });
 }
 
-grpc::Status CatalogueService::GetVersion(grpc::ServerContext* /*context*/,
+grpc::Status CatalogueService::GetVersion(grpc::ServerContext* context,
                                           const v1::GetVersionRequest* request,
                                           v1::GetVersionResponse* response) {
-  return answer("GetVersion", [&] {
+  return answer(*context, "CatalogueService.GetVersion", [&] {
     *response->mutable_version() = message_of(catalogue_.find(request->reference()));
     return grpc::Status::OK;
   });
 }
 
-grpc::Status CatalogueService::FetchVersion(grpc::ServerContext* /*context*/,
+grpc::Status CatalogueService::FetchVersion(grpc::ServerContext* context,
                                             const v1::FetchVersionRequest* request,
                                             grpc::ServerWriter<v1::FetchVersionResponse>* writer) {
-  return answer("FetchVersion", [&]() -> grpc::Status {
+  return answer(*context, "CatalogueService.FetchVersion", [&]() -> grpc::Status {
     const VersionRecord version = catalogue_.find(request->reference());
     const std::filesystem::path path = catalogue_.path_of(version);
     std::error_code failure;

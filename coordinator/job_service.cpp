@@ -29,26 +29,25 @@ class Counted {
 
 }  // namespace
 
-grpc::Status JobService::Submit(grpc::ServerContext* /*context*/, const v1::SubmitRequest* request,
+grpc::Status JobService::Submit(grpc::ServerContext* context, const v1::SubmitRequest* request,
                                 v1::SubmitResponse* response) {
-  return answer("Submit", [&] {
+  return answer(*context, "JobService.Submit", [&] {
     *response->mutable_job() = scheduler_.submit(*request);
     return grpc::Status::OK;
   });
 }
 
-grpc::Status JobService::GetJob(grpc::ServerContext* /*context*/, const v1::GetJobRequest* request,
+grpc::Status JobService::GetJob(grpc::ServerContext* context, const v1::GetJobRequest* request,
                                 v1::GetJobResponse* response) {
-  return answer("GetJob", [&] {
+  return answer(*context, "JobService.GetJob", [&] {
     *response->mutable_job() = scheduler_.job(request->job_id());
     return grpc::Status::OK;
   });
 }
 
-grpc::Status JobService::ListJobs(grpc::ServerContext* /*context*/,
-                                  const v1::ListJobsRequest* request,
+grpc::Status JobService::ListJobs(grpc::ServerContext* context, const v1::ListJobsRequest* request,
                                   v1::ListJobsResponse* response) {
-  return answer("ListJobs", [&] {
+  return answer(*context, "JobService.ListJobs", [&] {
     const bool has_limit = request->limit() > 0 && request->limit() < v1::kListLimit;
     for (v1::Job& job : scheduler_.jobs(request->unfinished_only(),
                                         has_limit ? request->limit() : v1::kListLimit)) {
@@ -60,7 +59,7 @@ grpc::Status JobService::ListJobs(grpc::ServerContext* /*context*/,
 
 grpc::Status JobService::WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
                                   grpc::ServerWriter<v1::WatchJobResponse>* writer) {
-  return answer("WatchJob", [&]() -> grpc::Status {
+  return answer(*context, "JobService.WatchJob", [&]() -> grpc::Status {
     const Counted counted(watchers_);
     if (counted.value() > kWatchersLimit) {
       return {grpc::StatusCode::RESOURCE_EXHAUSTED,
@@ -94,10 +93,10 @@ grpc::Status JobService::send_changes(const grpc::ServerContext& context, const 
   }
 }
 
-grpc::Status JobService::CancelJob(grpc::ServerContext* /*context*/,
+grpc::Status JobService::CancelJob(grpc::ServerContext* context,
                                    const v1::CancelJobRequest* request,
                                    v1::CancelJobResponse* response) {
-  return answer("CancelJob", [&] {
+  return answer(*context, "JobService.CancelJob", [&] {
     check_id(request->request_id(), "request_id");
     *response->mutable_job() = scheduler_.cancel(request->job_id());
     return grpc::Status::OK;

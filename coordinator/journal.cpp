@@ -328,7 +328,8 @@ std::vector<FailureRecord> Journal::failures_of(const std::string& job, StageNam
   s.text(job).number(static_cast<std::uint64_t>(stage));
   std::vector<FailureRecord> failures;
   while (s.step()) {
-    failures.push_back({job, stage, s.number_of(0), s.bytes_of(1), s.bytes_of(2)});
+    failures.push_back(
+        {job, stage, s.number_of(0), s.bytes_of(1), s.bytes_of(2), TroubleKind::kFailed});
   }
   return failures;
 }

@@ -107,6 +107,8 @@ ReportEvent report_from(const v1::SynchronizeRequest& request) {
   check_count(request.name().size(), v1::kNameLimitBytes, "the length of name");
   check_count(request.threads(), v1::kThreadsLimit, "threads");
   check_count(request.free_attempts(), v1::kFreeAttemptsLimit, "free_attempts");
+  check_count(static_cast<std::uint64_t>(request.labels_size()), v1::kLabelsLimit, "labels");
+  check_count(static_cast<std::uint64_t>(request.scenes_size()), v1::kScenesLimit, "scenes");
   check_count(static_cast<std::uint64_t>(request.completions_size()), v1::kCompletionLimit,
               "the number of completions");
   check_count(request.wait_ms(), v1::kWaitLimitMs, "wait_ms");
@@ -121,9 +123,15 @@ ReportEvent report_from(const v1::SynchronizeRequest& request) {
   report.fingerprint = digest_from(request.fingerprint(), "fingerprint");
   report.free_attempts = request.leaving() ? 0 : request.free_attempts();
   report.leaving = request.leaving();
+  report.labels.assign(request.labels().begin(), request.labels().end());
+  report.wall_left_ms = request.wall_left_ms();
+  for (const std::string& scene : request.scenes()) {
+    report.scenes.push_back(digest_from(scene, "scenes"));
+  }
   for (const v1::RunningAttempt& running : request.running()) {
-    report.running.push_back(
-        {running.job_id(), running.attempt(), running.lease_token(), running.shards_done()});
+    report.running.push_back({running.job_id(), running.attempt(), running.lease_token(),
+                              running.shards_done(), running.progress(),
+                              running.last_line().substr(0, v1::kLastLineLimitBytes)});
   }
   for (const v1::Completion& completion : request.completions()) {
     report.completions.push_back(completion_from(completion));

@@ -67,6 +67,8 @@ void Queue::on(const SubmitEvent& event, Time now, Actions& actions) {
   job.id = event.job;
   job.fabric = event.fabric;
   job.submitted_at = event.submitted_at;
+  job.demands = event.demands;
+  job.is_paused = event.is_paused;
   job.served_at = now;
   if (event.fingerprint) {
     job.fingerprint = event.fingerprint;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -65,6 +66,11 @@ class Queue {
 
   void on(const SubmitEvent& event, Time now, Actions& actions);
   void on(const CancelEvent& event, Time now, Actions& actions);
+  void on(const PauseEvent& event, Time now, Actions& actions);
+  void on(const PriorityEvent& event, Time now, Actions& actions);
+  void on(const DrainEvent& event, Time now, Actions& actions);
+  void on(const BlockEvent& event, Time now, Actions& actions);
+  void on(const DisconnectEvent& event, Time now, Actions& actions);
   void on(const PlannedEvent& event, Time now, Actions& actions);
   void on(const JobFailedEvent& event, Time now, Actions& actions);
   void on(const CommittedEvent& event, Time now, Actions& actions);
@@ -127,7 +133,9 @@ class Queue {
   std::map<std::uint64_t, JobState> jobs_;  // by order of submission
   std::map<std::string, std::uint64_t> order_of_job_;
   std::map<std::string, WorkerState> workers_;
-  std::map<std::uint64_t, Attempt> attempts_;  // those that own their shards
+  std::map<std::uint64_t, Attempt> attempts_;           // those that own their shards
+  std::set<std::string> drained_;                       // names of workers
+  std::map<std::string, std::set<StageName>> blocked_;  // names of workers: kinds of tasks
   // The unfinished shards of all jobs, by the digest of their work.
   std::unordered_map<core::Digest, std::vector<ShardRef>, core::DigestHash> unfinished_;
 };

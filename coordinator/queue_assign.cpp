@@ -21,7 +21,7 @@ AssignAction Queue::describe(const Attempt& attempt) const {
   return {attempt.job,         job.stages[attempt.stage].name,
           attempt.id,          attempt.token,
           attempt.first_shard, attempt.shards,
-          settings_.lease_ms};
+          settings_.lease_ms,  Purpose::kFirst};
 }
 
 void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
@@ -78,15 +78,20 @@ void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
 }
 
 std::optional<Queue::Run> Queue::next_run(const WorkerState& worker, bool is_busy, Time now) {
+  if (drained_.contains(worker.name)) {
+    return std::nullopt;
+  }
+  const auto blocked = blocked_.find(worker.name);
   for (auto& [order, job] : jobs_) {
-    if (job.has_ended() || job.fingerprint != worker.fingerprint) {
+    if (job.has_ended() || job.is_paused || job.fingerprint != worker.fingerprint) {
       continue;
     }
     for (std::size_t s = 0; s < job.stages.size(); ++s) {
       StageState& stage = job.stages[s];
       const auto backoff = stage.backoffs.find(worker.id);
       const bool must_wait = backoff != stage.backoffs.end() && now < backoff->second.until;
-      if (stage.pending() == 0 || must_wait) {
+      const bool is_blocked = blocked != blocked_.end() && blocked->second.contains(stage.name);
+      if (stage.pending() == 0 || must_wait || is_blocked) {
         continue;
       }
       const std::uint64_t size = run_size(job, stage, worker, is_busy, now);

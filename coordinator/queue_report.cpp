@@ -186,7 +186,7 @@ void Queue::take_results(const JobState& job, const Attempt& run, const Completi
     }
     ++workers_[worker].shards_done;
     const core::Digest work = stage.digests[result.shard];
-    actions.results.push_back({work, result.digest, result.size_bytes});
+    actions.results.push_back({work, result.digest, result.size_bytes, workers_[worker].name});
     finish_shard(work, result.digest, now, actions);
   }
 }

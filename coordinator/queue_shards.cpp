@@ -132,7 +132,8 @@ void Queue::fail_shard(const Attempt& attempt, const Failure& failure, Time now,
   same.insert(attempt.worker);
   trouble.retry_at = now + std::chrono::milliseconds(settings_.retry_ms) *
                                (1 << std::min(trouble.failures - 1, 10U));
-  actions.failures.push_back({job.id, stage.name, shard, attempt.worker, failure.message});
+  actions.failures.push_back(
+      {job.id, stage.name, shard, attempt.worker, failure.message, TroubleKind::kFailed});
   const bool is_quarantined =
       trouble.failures >= settings_.failure_limit || same.size() >= settings_.same_error_limit;
   if (is_quarantined) {

@@ -78,6 +78,8 @@ struct JobState {
   bool plan_again = false;  // something ended since the plan that is being made was asked for
   std::vector<StageState> stages;  // in the order they were planned
   std::string error;
+  JobDemands demands;
+  bool is_paused = false;
   Time submitted_at{};
   Time started_at{};
   Time ended_at{};

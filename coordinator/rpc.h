@@ -3,6 +3,7 @@
 #include <exception>
 #include <utility>
 
+#include <grpcpp/server_context.h>
 #include <grpcpp/support/status.h>
 #include <spdlog/spdlog.h>
 
@@ -11,10 +12,10 @@
 
 namespace weft::coordinator {
 
-// Runs the body of an RPC and turns what it throws into the call's status: the one place where a
-// service catches.
+// Runs the body of an RPC ("JobService.Submit") and turns what it throws into the call's status:
+// the one place where a service catches.
 template <class Body>
-grpc::Status answer(const char* call, Body&& body) {
+grpc::Status answer(const grpc::ServerContextBase& /*context*/, const char* call, Body&& body) {
   try {
     return std::forward<Body>(body)();
   } catch (const core::Error& error) {

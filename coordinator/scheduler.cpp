@@ -99,8 +99,12 @@ void Scheduler::load() {
       JobFile& file = files_[record.id];
       file.description = parse_description(record.description, record.id);
       file.comment = record.comment;
-      apply(SubmitEvent{record.id, record.fabric, record.fingerprint,
-                        Time(std::chrono::milliseconds(record.submitted_at_ms))},
+      apply(SubmitEvent{record.id,
+                        record.fabric,
+                        record.fingerprint,
+                        Time(std::chrono::milliseconds(record.submitted_at_ms)),
+                        {},
+                        false},
             nullptr);
       continue;
     }
@@ -250,7 +254,7 @@ v1::Job Scheduler::submit(const v1::SubmitRequest& request) {
   record.submitted_at_ms = to_ms(now);
   files_[record.id].description = request.description();
   files_[record.id].comment = record.comment;
-  const SubmitEvent event{record.id, record.fabric, std::nullopt, now};
+  const SubmitEvent event{record.id, record.fabric, std::nullopt, now, {}, false};
   spdlog::info("job={} fabric={} event=submitted", record.id, record.fabric);
   const std::string id = record.id;
   journal_.append({std::move(record)});

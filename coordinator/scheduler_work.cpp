@@ -98,12 +98,12 @@ PlannedStage Scheduler::with_known(const std::string& job, const Stage& stage,
   const std::vector<std::optional<core::Digest>> results = journal_.results_of(digests);
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && blobs_.has(*results[i])) {
-      planned.known.push_back({i, *results[i]});
+      planned.known.push_back({i, *results[i], {}, false});
     }
   }
   for (FailureRecord& failure : journal_.failures_of(job, stage.name)) {
     planned.failures.push_back(
-        {failure.shard, std::move(failure.worker), std::move(failure.message)});
+        {failure.kind, failure.shard, std::move(failure.worker), std::move(failure.message)});
   }
   planned.digests = std::move(digests);
   return planned;

@@ -26,7 +26,7 @@ void keep_verified(const storage::BlobStore& blobs, ReportEvent& report) {
 grpc::Status WorkerService::Synchronize(grpc::ServerContext* context,
                                         const v1::SynchronizeRequest* request,
                                         v1::SynchronizeResponse* response) {
-  return answer("Synchronize", [&]() -> grpc::Status {
+  return answer(*context, "WorkerService.Synchronize", [&]() -> grpc::Status {
     ReportEvent report = report_from(*request);
     keep_verified(scheduler_.blobs(), report);
     std::optional<v1::SynchronizeResponse> reply = scheduler_.synchronize(
@@ -40,10 +40,10 @@ grpc::Status WorkerService::Synchronize(grpc::ServerContext* context,
   });
 }
 
-grpc::Status WorkersService::ListWorkers(grpc::ServerContext* /*context*/,
+grpc::Status WorkersService::ListWorkers(grpc::ServerContext* context,
                                          const v1::ListWorkersRequest* /*request*/,
                                          v1::ListWorkersResponse* response) {
-  return answer("ListWorkers", [&] {
+  return answer(*context, "WorkersService.ListWorkers", [&] {
     for (v1::Worker& worker : scheduler_.workers()) {
       response->add_workers()->Swap(&worker);
     }

@@ -19,6 +19,12 @@ inline constexpr std::size_t kNameLimitBytes = 128;
 inline constexpr std::size_t kErrorTextLimitBytes = 4096;
 inline constexpr std::size_t kCommentLimitBytes = 1024;
 inline constexpr std::uint32_t kListLimit = 1000;
+inline constexpr std::size_t kLabelsLimit = 16;
+inline constexpr std::size_t kScenesLimit = 8;
+inline constexpr std::size_t kLastLineLimitBytes = 256;
+inline constexpr std::size_t kLogChunkLimitBytes = std::size_t{64} << 10;
+inline constexpr std::uint64_t kAttemptLogLimitBytes = std::uint64_t{256} << 10;
+inline constexpr int kPiecesLimit = 4096;
 
 // Of render.proto.
 inline constexpr int kAttachmentsLimit = 20'000;

@@ -28,7 +28,9 @@ class JournalTest : public testing::Test {
 
   static ResultRecord result(int number) {
     return {core::digest_of(std::string("work ").append(std::to_string(number))),
-            core::digest_of(std::string("result ").append(std::to_string(number))), 5};
+            core::digest_of(std::string("result ").append(std::to_string(number))),
+            5,
+            {}};
   }
   static JobRecord job(const std::string& id) {
     JobRecord record;
@@ -71,8 +73,9 @@ TEST_F(JournalTest, Records_AreThereAfterReopening) {
     Journal journal(file());
     EXPECT_EQ(journal.epoch(), 1U);
     journal.append({job("a"), job("b"), result(1)});
-    journal.append({BindRecord{"b", core::digest_of("fingerprint")},
-                    FailureRecord{"b", StageName::kBasis, 3, "w", "it burns"}});
+    journal.append(
+        {BindRecord{"b", core::digest_of("fingerprint")},
+         FailureRecord{"b", StageName::kBasis, 3, "w", "it burns", TroubleKind::kFailed}});
     journal.wait(journal.append({JobEndRecord{"a", 99, "summary"}}));
   }
   Journal journal(file());

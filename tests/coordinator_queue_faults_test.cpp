@@ -263,8 +263,11 @@ TEST(QueueFaults, FailuresFromBeforeARestart_Count) {
   cluster.hold_plans = true;
   cluster.submit("a", {1}, "", core::Digest{});
   PlannedEvent planned{"a", 0, {}};
-  planned.stages.push_back({all_stages()[0], {QueueCluster::work("a", 0, 0)}, {}, {}});
-  planned.stages[0].failures.assign(4, PriorFailure{0, "earlier", "it burned"});
+  PlannedStage& stage = planned.stages.emplace_back();
+  stage.name = all_stages()[0];
+  stage.digests = {QueueCluster::work("a", 0, 0)};
+  planned.stages[0].failures.assign(4,
+                                    PriorFailure{TroubleKind::kFailed, 0, "earlier", "it burned"});
   cluster.apply(planned);
   QueueWorker worker(cluster, "w", 1);
   worker.sync(1);

@@ -24,7 +24,7 @@ class QueueCluster {
   void submit(const std::string& job, std::vector<std::uint64_t> shards,
               const std::string& content = "", std::optional<core::Digest> fingerprint = {}) {
     plans_[job] = {std::move(shards), content.empty() ? job : content};
-    apply(SubmitEvent{job, "fabric", fingerprint, now});
+    apply(SubmitEvent{job, "fabric", fingerprint, now, {}, false});
   }
 
   // What a shard's work is called and what its result is.
@@ -72,7 +72,7 @@ class QueueCluster {
         stage.digests.push_back(work(content, done, i, plan.fingerprint));
         const auto known = cache.find(stage.digests.back());
         if (known != cache.end()) {
-          stage.known.push_back({i, known->second});
+          stage.known.push_back({i, known->second, {}, false});
         }
       }
       event.stages.push_back(std::move(stage));
@@ -135,7 +135,7 @@ class QueueWorker {
     for (const AssignAction& assign : reply.assignments) {
       if (!holds(assign.attempt)) {
         held.push_back(assign);
-        report_.running.push_back({assign.job, assign.attempt, assign.token, 0});
+        report_.running.push_back({assign.job, assign.attempt, assign.token, 0, 0, {}});
       }
     }
     for (const AttemptName& name : reply.acknowledged) {
