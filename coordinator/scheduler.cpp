@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "coordinator/records.h"
 #include "core/check.h"
 #include "core/error.h"
 #include "fabric/description.h"
@@ -119,20 +120,15 @@ void Scheduler::load() {
 // durable.
 Journal::Ticket Scheduler::apply(const Event& event, Reply* reply) {
   Actions actions = queue_.apply(event, clock_.now());
-  std::vector<Record> records;
-  for (BindRecord& bound : actions.bound) {
+  for (const BindRecord& bound : actions.bound) {
     spdlog::info("job={} event=bound fingerprint={}", bound.job,
                  bound.fingerprint.hex().substr(0, 12));
-    records.emplace_back(std::move(bound));
   }
-  for (ResultRecord& result : actions.results) {
-    records.emplace_back(result);
-  }
-  for (FailureRecord& failure : actions.failures) {
+  for (const FailureRecord& failure : actions.failures) {
     spdlog::warn("job={} stage={} shard={} worker={} event=failed message=\"{}\"", failure.job,
                  to_string(failure.stage), failure.shard, failure.worker, failure.message);
-    records.emplace_back(std::move(failure));
   }
+  std::vector<Record> records = records_of(actions);
   for (const std::string& id : actions.ended) {
     end_job(id, records);
   }
