@@ -38,7 +38,7 @@ VersionRecord Catalogue::publish(const Publication& publication) {
                       "'" + publication.fabric + "' cannot be a fabric's name");
   }
   const std::lock_guard lock(publishing_);
-  const std::vector<VersionRecord> versions = journal_.versions(publication.fabric);
+  const std::vector<VersionRecord> versions = journal_.catalogue().versions(publication.fabric);
   if (!versions.empty() && versions.front().content_digest == publication.content_digest) {
     std::filesystem::remove(publication.file);
     return versions.front();
@@ -54,7 +54,7 @@ VersionRecord Catalogue::publish(const Publication& publication) {
   version.comment = publication.comment;
   version.published_at_ms = publication.now_ms;
   core::publish_file(publication.file, path_of(version));
-  journal_.add_version(version);
+  journal_.catalogue().add_version(version);
   return version;
 }
 
@@ -71,10 +71,10 @@ VersionRecord Catalogue::find(const std::string& reference) const {
                           "' names no version; write NAME, NAME@latest or NAME@NUMBER, where NAME "
                           "is of a-z, 0-9, _ and -");
   }
-  const std::vector<VersionRecord> versions = journal_.versions(name);
+  const std::vector<VersionRecord> versions = journal_.catalogue().versions(name);
   if (versions.empty()) {
     throw core::Error(core::Code::kNotFound, "there is no fabric named '" + name + "'; " +
-                                                 names_of(journal_.latest_versions()));
+                                                 names_of(journal_.catalogue().latest_versions()));
   }
   if (!is_number) {
     return versions.front();
@@ -90,10 +90,12 @@ VersionRecord Catalogue::find(const std::string& reference) const {
 }
 
 std::vector<VersionRecord> Catalogue::versions(const std::string& fabric) const {
-  return journal_.versions(fabric);
+  return journal_.catalogue().versions(fabric);
 }
 
-std::vector<VersionRecord> Catalogue::latest_versions() const { return journal_.latest_versions(); }
+std::vector<VersionRecord> Catalogue::latest_versions() const {
+  return journal_.catalogue().latest_versions();
+}
 
 std::filesystem::path Catalogue::path_of(const VersionRecord& version) const {
   return folder_ / version.file;

@@ -28,10 +28,6 @@ CREATE TABLE IF NOT EXISTS failures(
   job TEXT NOT NULL, stage INTEGER NOT NULL, shard INTEGER NOT NULL, worker TEXT NOT NULL,
   message TEXT NOT NULL);
 CREATE INDEX IF NOT EXISTS failures_by_job ON failures(job, stage);
-CREATE TABLE IF NOT EXISTS versions(
-  fabric TEXT NOT NULL, number INTEGER NOT NULL, content_digest BLOB NOT NULL,
-  size_bytes INTEGER NOT NULL, file TEXT NOT NULL, job TEXT NOT NULL, comment TEXT NOT NULL,
-  published_at_ms INTEGER NOT NULL, PRIMARY KEY(fabric, number)) WITHOUT ROWID;
 )sql";
 
 void write(Connection& c, const JobRecord& job) {
@@ -103,30 +99,6 @@ JobRecord job_of(const Statement& s) {
   return job;
 }
 
-constexpr const char* kVersionColumns =
-    "fabric, number, content_digest, size_bytes, file, job, comment, published_at_ms";
-
-VersionRecord version_of(const Statement& s) {
-  VersionRecord version;
-  version.fabric = s.bytes_of(0);
-  version.number = s.number_of(1);
-  version.content_digest = s.digest_of(2);
-  version.size_bytes = s.number_of(3);
-  version.file = s.bytes_of(4);
-  version.job = s.bytes_of(5);
-  version.comment = s.bytes_of(6);
-  version.published_at_ms = s.signed_of(7);
-  return version;
-}
-
-std::vector<VersionRecord> versions_of(Statement& s) {
-  std::vector<VersionRecord> versions;
-  while (s.step()) {
-    versions.push_back(version_of(s));
-  }
-  return versions;
-}
-
 }  // namespace
 
 struct Journal::State {
@@ -138,6 +110,7 @@ struct Journal::State {
 
   std::mutex connection_mutex;  // locked before `mutex` where both are
   Connection connection;
+  JournalCatalogue catalogue{connection, connection_mutex};
   std::uint32_t epoch = 0;
 
   std::mutex mutex;  // of everything below
@@ -157,6 +130,7 @@ void Journal::State::open() {
       "PRAGMA locking_mode=EXCLUSIVE; PRAGMA journal_mode=WAL; "
       "PRAGMA synchronous=FULL; BEGIN EXCLUSIVE;");
   connection.run(kTables);
+  JournalCatalogue::create_tables(connection);
   Statement schema(connection, "SELECT value FROM meta WHERE key = 'schema'");
   if (schema.step() && schema.signed_of(0) != kSchema) {
     throw core::Error(core::Code::kFailedPrecondition,
@@ -334,39 +308,6 @@ std::vector<FailureRecord> Journal::failures_of(const std::string& job, StageNam
   return failures;
 }
 
-void Journal::add_version(const VersionRecord& version) {
-  const std::lock_guard lock(state_->connection_mutex);
-  Statement(state_->connection, ("INSERT INTO versions(" + std::string(kVersionColumns) +
-                                 ") VALUES(?, ?, ?, ?, ?, ?, ?, ?)")
-                                    .c_str())
-      .text(version.fabric)
-      .number(version.number)
-      .blob(version.content_digest.binary())
-      .number(version.size_bytes)
-      .text(version.file)
-      .text(version.job)
-      .text(version.comment)
-      .number(static_cast<std::uint64_t>(version.published_at_ms))
-      .step();
-}
-
-std::vector<VersionRecord> Journal::latest_versions() {
-  const std::lock_guard lock(state_->connection_mutex);
-  Statement s(state_->connection,
-              ("SELECT " + std::string(kVersionColumns) +
-               " FROM versions v WHERE number = (SELECT MAX(number) FROM versions w WHERE "
-               "w.fabric = v.fabric) ORDER BY fabric")
-                  .c_str());
-  return versions_of(s);
-}
-
-std::vector<VersionRecord> Journal::versions(const std::string& fabric) {
-  const std::lock_guard lock(state_->connection_mutex);
-  Statement s(state_->connection, ("SELECT " + std::string(kVersionColumns) +
-                                   " FROM versions WHERE fabric = ? ORDER BY number DESC")
-                                      .c_str());
-  s.text(fabric);
-  return versions_of(s);
-}
+JournalCatalogue& Journal::catalogue() { return state_->catalogue; }
 
 }  // namespace weft::coordinator

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "coordinator/journal_catalogue.h"
 #include "coordinator/queue_events.h"
 #include "core/digest.h"
 
@@ -32,18 +33,6 @@ struct JobEndRecord {
   std::string job;
   std::int64_t ended_at_ms = 0;
   std::string summary;
-};
-
-// A published version of a fabric.
-struct VersionRecord {
-  std::string fabric;
-  std::uint64_t number = 0;
-  core::Digest content_digest;
-  std::uint64_t size_bytes = 0;
-  std::string file;  // its name in the versions folder
-  std::string job;
-  std::string comment;
-  std::int64_t published_at_ms = 0;
 };
 
 using Record = std::variant<JobRecord, JobEndRecord, BindRecord, ResultRecord, FailureRecord>;
@@ -86,11 +75,8 @@ class Journal {
   std::uint64_t forget_result(const core::Digest& result);
   [[nodiscard]] std::vector<FailureRecord> failures_of(const std::string& job, StageName stage);
 
-  // Puts a version into the catalogue; durable on return. Throws core::Error(kAlreadyExists) when
-  // that number is taken.
-  void add_version(const VersionRecord& version);
-  [[nodiscard]] std::vector<VersionRecord> latest_versions();  // one of each fabric, by name
-  [[nodiscard]] std::vector<VersionRecord> versions(const std::string& fabric);  // newest first
+  // The catalogue's part of the same file.
+  [[nodiscard]] JournalCatalogue& catalogue();
 
  private:
   struct State;
