@@ -20,8 +20,16 @@ void add_up(CLI::App& app);       // a local cluster
 void add_submit(CLI::App& app);
 void add_jobs(CLI::App& app);
 void add_watch(CLI::App& app);
+void add_explain(CLI::App& app);
+void add_logs(CLI::App& app);
+void add_pause(CLI::App& app);
+void add_resume(CLI::App& app);
+void add_priority(CLI::App& app);
 void add_cancel(CLI::App& app);
+void add_retry(CLI::App& app);
 void add_workers(CLI::App& app);
+void add_drain(CLI::App& app);
+void add_unblock(CLI::App& app);
 void add_fabrics(CLI::App& app);
 void add_versions(CLI::App& app);
 void add_fetch(CLI::App& app);

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
+#include "cli/message_json.h"
 #include "cli/progress.h"
 #include "client/fetch_version.h"
 #include "proto/weft/v1/cluster.pb.h"
@@ -16,6 +15,9 @@ namespace weft::cli {
 
 // "queued", "running", "committing", "succeeded", "failed", "cancelled".
 [[nodiscard]] std::string state_text(v1::JobState state);
+
+// "live", "lost", "drained", "blocked for transfer, grid", or several of these.
+[[nodiscard]] std::string condition_text(const v1::Worker& worker);
 
 // "2026-11-22 09:04:05" (UTC); "-" for 0.
 [[nodiscard]] std::string time_text(std::int64_t at_ms);
@@ -29,22 +31,5 @@ using client::reference_text;  // "silk@3"
 [[nodiscard]] std::string shards_text(const v1::Job& job);
 
 [[nodiscard]] std::vector<StageProgress> stages_of(const v1::Job& job);
-
-// Names as in cluster.proto; digests in hexadecimal; times in ISO 8601 (UTC), null when not
-// reached.
-[[nodiscard]] nlohmann::json to_json(const v1::Job& job);
-[[nodiscard]] nlohmann::json to_json(const v1::Version& version);
-[[nodiscard]] nlohmann::json to_json(const v1::Fabric& fabric);
-[[nodiscard]] nlohmann::json to_json(const v1::Worker& worker);
-
-// The same of each message of a list, as an array.
-template <class Messages>
-[[nodiscard]] nlohmann::json to_json_array(const Messages& messages) {
-  nlohmann::json array = nlohmann::json::array();
-  for (const auto& message : messages) {
-    array.push_back(to_json(message));
-  }
-  return array;
-}
 
 }  // namespace weft::cli

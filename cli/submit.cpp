@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -30,23 +31,23 @@ constexpr const char* kHelp =
     "job.\n"
     "Example: weft submit examples/tiny.textproto --quality preview --wait -o tiny.h5";
 
-struct SubmitOptions {
+struct SubmitFlags {
   std::string coordinator;
   std::string fabric;
   std::string output;
   std::string quality;
-  std::string comment;
+  v1::SubmitOptions demands;
   bool is_waiting = false;
   bool is_dry_run = false;
   bool wants_json = false;
 };
 
 v1::Job submit(Client& client, const v1::FabricDescription& description,
-               const std::string& comment) {
+               const v1::SubmitOptions& demands) {
   v1::SubmitRequest request;
   request.set_request_id(new_request_id());
   *request.mutable_description() = description;
-  request.mutable_options()->set_comment(comment);
+  *request.mutable_options() = demands;
   if (request.ByteSizeLong() > v1::kMessageLimitBytes) {
     throw core::Error(core::Code::kResourceExhausted,
                       fmt::format("the description is larger than {} with the files it names; "
@@ -59,7 +60,7 @@ v1::Job submit(Client& client, const v1::FabricDescription& description,
       .job();
 }
 
-void run(const SubmitOptions& options) {
+void run(const SubmitFlags& options) {
   const v1::FabricDescription description =
       fabric::load_description(options.fabric, parse_quality(options.quality));
   if (options.is_dry_run) {
@@ -70,7 +71,7 @@ void run(const SubmitOptions& options) {
     check_output_file(options.output);
   }
   Client connection(options.coordinator);
-  v1::Job job = submit(connection, description, options.comment);
+  v1::Job job = submit(connection, description, options.demands);
   fmt::print(stderr, "submitted {} as {}; 'weft watch {}' shows how far it is\n", job.fabric(),
              job.id(), job.id());
   if (options.is_waiting) {
@@ -106,19 +107,49 @@ void run(const SubmitOptions& options) {
   }
 }
 
+void add_demands(CLI::App& command, v1::SubmitOptions& demands) {
+  const auto text = [&](const std::string& name, auto set, const std::string& help) {
+    return command.add_option_function<std::string>(
+        name, [&demands, set](const std::string& value) { (demands.*set)(value); }, help);
+  };
+  text("--comment", &v1::SubmitOptions::set_comment<const std::string&>,
+       "A line kept with the version (1024 bytes)")
+      ->check([](const std::string& comment) {
+        return comment.size() <= v1::kCommentLimitBytes ? std::string()
+                                                        : "the comment is longer than 1024 bytes";
+      });
+  text("--user", &v1::SubmitOptions::set_user<const std::string&>,
+       "Who it is for, in the cluster's shares (default: you)")
+      ->envname("WEFT_USER");
+  command
+      .add_option_function<std::int32_t>(
+          "--priority", [&demands](std::int32_t value) { demands.set_priority(value); },
+          "From -100 to 100, the higher the earlier (default: 0)")
+      ->check(CLI::Range(-100, 100));
+  command
+      .add_option_function<double>(
+          "--audit", [&demands](double value) { demands.set_audit(value); },
+          "Share of the work that a second worker repeats and compares, 0 to 1 (default: 0)")
+      ->check(CLI::Range(0.0, 1.0));
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--label",
+          [&demands](const std::vector<std::string>& labels) {
+            demands.mutable_labels()->Assign(labels.begin(), labels.end());
+          },
+          "Only workers with this label (as often as needed)")
+      ->allow_extra_args(false);
+}
+
 }  // namespace
 
 void add_submit(CLI::App& app) {
-  auto options = std::make_shared<SubmitOptions>();
+  auto options = std::make_shared<SubmitFlags>();
   CLI::App* command = add_command(app, "submit", kHelp);
   command->add_option("fabric", options->fabric, "Description: a .textproto or .json file")
       ->required();
   add_quality_option(*command, options->quality);
-  command->add_option("--comment", options->comment, "A line kept with the version (1024 bytes)")
-      ->check([](const std::string& text) {
-        return text.size() <= v1::kCommentLimitBytes ? std::string()
-                                                     : "the comment is longer than 1024 bytes";
-      });
+  add_demands(*command, options->demands);
   CLI::Option* wait =
       command->add_flag("--wait", options->is_waiting, "Return when the job has ended");
   command

@@ -27,16 +27,13 @@ struct WorkersOptions {
 };
 
 std::string doing(const v1::Worker& worker) {
-  if (worker.lost()) {
-    return "lost";
-  }
   std::string text;
   for (const v1::WorkerAttempt& attempt : worker.attempts()) {
     text += text.empty() ? "" : ", ";
     text += fmt::format("{} {} {}/{}", attempt.fabric(), attempt.stage(), attempt.shards_done(),
                         attempt.shards());
   }
-  return text.empty() ? "idle" : text;
+  return text.empty() ? "-" : text;
 }
 
 void run(const WorkersOptions& options) {
@@ -48,9 +45,9 @@ void run(const WorkersOptions& options) {
     print_json(to_json_array(response.workers()));
     return;
   }
-  Table table({"NAME", "ID", "THREADS", "SHARDS", "FAILURES", "LAST SEEN", "DOING"});
+  Table table({"NAME", "ID", "CONDITION", "THREADS", "SHARDS", "FAILURES", "LAST SEEN", "DOING"});
   for (const v1::Worker& worker : response.workers()) {
-    table.add({worker.name(), worker.id(), std::to_string(worker.threads()),
+    table.add({worker.name(), worker.id(), condition_text(worker), std::to_string(worker.threads()),
                std::to_string(worker.shards_done()), std::to_string(worker.failures()),
                time_text(worker.last_seen_at_ms()), doing(worker)});
   }

@@ -24,8 +24,16 @@ int main(int argc, char** argv) {
   cli::add_submit(app);
   cli::add_jobs(app);
   cli::add_watch(app);
+  cli::add_explain(app);
+  cli::add_logs(app);
+  cli::add_pause(app);
+  cli::add_resume(app);
+  cli::add_priority(app);
   cli::add_cancel(app);
+  cli::add_retry(app);
   cli::add_workers(app);
+  cli::add_drain(app);
+  cli::add_unblock(app);
   cli::add_fabrics(app);
   cli::add_versions(app);
   cli::add_fetch(app);
