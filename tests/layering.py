@@ -15,10 +15,11 @@ MAY_INCLUDE = {
     "fabric": {"core", "proto"},
     "transport": {"core", "shading", "fabric"},
     "storage": {"core", "shading"},
-    "client": {"core", "proto", "storage"},
-    "coordinator": {"core", "fabric", "proto", "storage", "shading"},
-    "worker": {"core", "fabric", "shading", "transport", "proto"},
-    "render": {"core", "shading", "fabric", "transport", "storage", "proto", "client"},
+    "security": {"core", "proto"},
+    "client": {"core", "proto", "security", "storage"},
+    "coordinator": {"core", "fabric", "proto", "security", "storage", "shading"},
+    "worker": {"core", "fabric", "security", "shading", "transport", "proto"},
+    "render": {"core", "shading", "fabric", "transport", "storage", "proto", "security", "client"},
 }
 MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
 
@@ -31,7 +32,7 @@ BEHIND = {
     r"vulkan/.*": {"render/gpu/vulkan.h"},
     r"sqlite3\.h": {"coordinator/sqlite.cpp"},
     r"tiny_obj_loader\.h": {"render/obj_mesh.cpp"},
-    r"openssl/.*": {"core/digest.cpp"},
+    r"openssl/.*": {"core/digest.cpp", "security/x509.cpp"},
     r"Random123/.*": {"core/random.h"},
 }
 
