@@ -21,23 +21,10 @@ void exchange_fields(Io& io, Database& db) {
   io.array("/exemplar/strand_radius_mm", db.strand_radius_mm);
   io.array("/exemplar/points_mm", db.points_mm);
 
-  io.columns("/materials/c_r", db.materials, [](auto& m) { return &m.c_r.x; });
-  io.columns("/materials/c_tt", db.materials, [](auto& m) { return &m.c_tt.x; });
-  io.columns("/materials/beta_r", db.materials, [](auto& m) { return &m.beta_r; });
-  io.columns("/materials/beta_tt", db.materials, [](auto& m) { return &m.beta_tt; });
-  io.columns("/materials/gamma_tt", db.materials, [](auto& m) { return &m.gamma_tt; });
-  io.derived("/materials/theta_o");
-  io.array("/materials/c_s", db.c_s);
-
   io.values("/cells/mean_free_path_mm", &db.mean_free_path_mm);
-  io.values("/cells/sigma_shadow_mm", &db.sigma_shadow_mm);
   io.values("/cells/cells_per_axis", &db.cells_per_axis.x);
   io.array("/cells/cell_of_segment", db.cell_of_segment);
   io.array("/cells/coordinates", db.cell_coordinates);
-
-  io.array("/iirtf/paths", db.cell_paths);
-  io.rounded("/iirtf/transfer", db.transfer);
-  io.rounded("/iirtf/standard_error", db.transfer_se);
 
   io.derived("/visibility/theta");
   io.derived("/visibility/phi");
@@ -53,6 +40,19 @@ void exchange_fields(Io& io, Database& db) {
 
   io.derived("/sg/sharpness");
   io.derived("/sg/zonal");
+
+  io.columns("/materials/c_r", db.materials, [](auto& m) { return &m.c_r.x; });
+  io.columns("/materials/c_tt", db.materials, [](auto& m) { return &m.c_tt.x; });
+  io.columns("/materials/beta_r", db.materials, [](auto& m) { return &m.beta_r; });
+  io.columns("/materials/beta_tt", db.materials, [](auto& m) { return &m.beta_tt; });
+  io.columns("/materials/gamma_tt", db.materials, [](auto& m) { return &m.gamma_tt; });
+  io.derived("/materials/theta_o");
+  io.array("/materials/c_s", db.c_s);
+
+  io.values("/cells/sigma_shadow_mm", &db.sigma_shadow_mm);
+  io.array("/iirtf/paths", db.cell_paths);
+  io.rounded("/iirtf/transfer", db.transfer);
+  io.rounded("/iirtf/standard_error", db.transfer_se);
 
   io.text("/provenance/description", db.description_json);
   io.text("/provenance/stages", db.stages_json);

@@ -21,6 +21,16 @@ struct StoredDataset {
 // REQUIRES: the file was verified.
 [[nodiscard]] std::vector<StoredDataset> stored_datasets(const std::filesystem::path& path);
 
+// Where stored bytes of datasets lie in the file.
+struct StoredChunk {
+  std::uint64_t offset = 0;  // from the beginning of the file
+  std::uint64_t size_bytes = 0;
+};
+
+// The chunks of all datasets, by offset. Throws as stored_datasets. REQUIRES: the file was
+// verified.
+[[nodiscard]] std::vector<StoredChunk> stored_chunks(const std::filesystem::path& path);
+
 // How exact the transfer matrices and the visibility are.
 struct DatabaseErrors {
   double transfer_rms = 0;        // of all coefficients

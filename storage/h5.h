@@ -106,6 +106,12 @@ class Reader {
   // REQUIRES: `info` is this dataset's and admitted, `out` has the size its shape needs.
   void read(const std::string& path, const Info& info, std::span<std::byte> out) const;
   [[nodiscard]] std::vector<std::string> read_text(const std::string& path);
+  // Where the dataset's chunks are stored: offsets behind the user block.
+  struct Extent {
+    std::uint64_t offset = 0;
+    std::uint64_t size_bytes = 0;
+  };
+  [[nodiscard]] std::vector<Extent> chunks(const std::string& path) const;
   [[nodiscard]] std::uint64_t file_bytes() const { return file_bytes_; }
 
  private:
