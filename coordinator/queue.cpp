@@ -113,7 +113,7 @@ void Queue::on(const PlannedEvent& event, Time now, Actions& actions) {
         std::any_of(job->stages.begin(), job->stages.end(),
                     [&](const StageState& stage) { return stage.name == planned.name; });
     if (!is_known) {
-      add_stage(order_of_job_.at(job->id), *job, planned, now);
+      add_stage(order_of_job_.at(job->id), *job, planned, now, actions);
       any_done = any_done || job->stages.back().is_done();
       actions.wake = true;
     }
@@ -146,7 +146,7 @@ void Queue::on(const ResultLostEvent& event, Time now, Actions& actions) {
           event.result.hex() + "); check that disk, then submit the job again";
       end_job(job, JobPhase::kFailed, now, actions);
     } else if (uses_it) {
-      begin_again(job, actions);
+      begin_again(job, now, actions);
     }
   }
 }
@@ -170,7 +170,8 @@ void Queue::ask_for_plan(JobState& job, Actions& actions) {
   actions.plan.push_back({job.id, job.generation, *job.fingerprint});
 }
 
-void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& planned, Time now) {
+void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& planned, Time now,
+                      Actions& actions) {
   StageState& stage = job.stages.emplace_back();
   const std::size_t index = job.stages.size() - 1;
   const std::size_t count = planned.digests.size();
@@ -204,13 +205,17 @@ void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& pl
   if (stage.is_done()) {
     stage.ended_at = now;
   }
-  if (stage.done > 0) {
+  for (const PriorAttempt& prior : planned.attempts) {
+    restore(job, index, prior, now, actions);
+  }
+  if (stage.done > 0 || stage.running > 0) {
     job.phase = JobPhase::kRunning;
   }
 }
 
 void Queue::end_job(JobState& job, JobPhase phase, Time now, Actions& actions) {
-  drop_work(job);
+  drop_work(job, phase == JobPhase::kSucceeded ? Outcome::kSuperseded : Outcome::kStopped, now,
+            actions);
   job.phase = phase;
   job.ended_at = now;
   ++job.revision;
@@ -220,9 +225,8 @@ void Queue::end_job(JobState& job, JobPhase phase, Time now, Actions& actions) {
 
 // Takes all of the job's shards out of the queue; its attempts no longer own anything, and their
 // workers are told so when they report next.
-void Queue::drop_work(JobState& job) {
+void Queue::drop_work(JobState& job, Outcome outcome, Time now, Actions& actions) {
   const std::uint64_t order = order_of_job_.at(job.id);
-  std::erase_if(attempts_, [&](const auto& entry) { return entry.second.job == job.id; });
   for (std::size_t s = 0; s < job.stages.size(); ++s) {
     StageState& stage = job.stages[s];
     for (std::size_t i = 0; i < stage.shards.size(); ++i) {
@@ -232,11 +236,15 @@ void Queue::drop_work(JobState& job) {
       }
     }
     stage.running = 0;
+    const std::set<std::uint64_t> attempts = stage.attempts;
+    for (const std::uint64_t id : attempts) {
+      end_attempt(id, outcome, "", now, actions);
+    }
   }
 }
 
-void Queue::begin_again(JobState& job, Actions& actions) {
-  drop_work(job);
+void Queue::begin_again(JobState& job, Time now, Actions& actions) {
+  drop_work(job, Outcome::kStopped, now, actions);
   job.stages.clear();
   ++job.generation;
   ++job.revision;
@@ -278,7 +286,7 @@ void Queue::bind_jobs(Time now, Actions& actions) {
       job.fingerprint = most;
       job.served_at = now;
       actions.bound.push_back({job.id, most});
-      begin_again(job, actions);
+      begin_again(job, now, actions);
     }
   }
 }

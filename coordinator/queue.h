@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "coordinator/queue_events.h"
@@ -36,6 +37,10 @@ class Queue {
 
   [[nodiscard]] const std::map<std::string, WorkerState>& workers() const { return workers_; }
   [[nodiscard]] const std::map<std::uint64_t, Attempt>& attempts() const { return attempts_; }
+  // Those of one worker, the oldest first.
+  [[nodiscard]] std::vector<const Attempt*> attempts_of(const std::string& worker_id) const;
+  [[nodiscard]] bool is_drained(const std::string& worker_name) const;
+  [[nodiscard]] std::vector<StageName> blocked_stages(const std::string& worker_name) const;
   [[nodiscard]] bool is_live(const WorkerState& worker, Time now) const;
   [[nodiscard]] const QueueSettings& settings() const { return settings_; }
 
@@ -81,17 +86,27 @@ class Queue {
   // jobs (queue.cpp)
   JobState* find_job(const std::string& id);
   void ask_for_plan(JobState& job, Actions& actions);
-  void add_stage(std::uint64_t order, JobState& job, const PlannedStage& planned, Time now);
+  void add_stage(std::uint64_t order, JobState& job, const PlannedStage& planned, Time now,
+                 Actions& actions);
   void end_job(JobState& job, JobPhase phase, Time now, Actions& actions);
-  void drop_work(JobState& job);
-  void begin_again(JobState& job, Actions& actions);
+  void drop_work(JobState& job, Outcome outcome, Time now, Actions& actions);
+  void begin_again(JobState& job, Time now, Actions& actions);
   void bind_jobs(Time now, Actions& actions);
+
+  // attempts (queue_attempts.cpp)
+  const Attempt& begin_attempt(Attempt attempt, Time now);
+  [[nodiscard]] AttemptRecord record_of(const Attempt& attempt) const;
+  Attempt end_attempt(std::uint64_t id, Outcome outcome, const std::string& message, Time now,
+                      Actions& actions);
+  void renew(Attempt& attempt, Time now);
+  void restore(const JobState& job, std::size_t stage, const PriorAttempt& prior, Time now,
+               Actions& actions);
 
   // shards (queue_shards.cpp)
   void finish_shard(const core::Digest& work, const core::Digest& result, Time now,
                     Actions& actions);
   void release(const Attempt& attempt);
-  void lose(const Attempt& attempt, Time now, Actions& actions);
+  void lose(std::uint64_t id, Time now, Actions& actions);
   void expire(Time now, Actions& actions);
   void fail_shard(const Attempt& attempt, const Failure& failure, Time now, Actions& actions);
   void back_off(const Attempt& attempt, const std::string& worker, Time now);
@@ -108,7 +123,8 @@ class Queue {
                                        std::uint64_t count) const;
   [[nodiscard]] Recognised recognise(const std::string& job_id, std::uint64_t attempt,
                                      const std::string& token, Attempt* run);
-  [[nodiscard]] bool adopt(const Attempt& run, const std::string& worker, Time now);
+  [[nodiscard]] bool adopt(const Attempt& run, const std::string& worker, Time now,
+                           Actions& actions);
 
   // assignments (queue_assign.cpp)
   struct Run {
@@ -133,8 +149,10 @@ class Queue {
   std::map<std::uint64_t, JobState> jobs_;  // by order of submission
   std::map<std::string, std::uint64_t> order_of_job_;
   std::map<std::string, WorkerState> workers_;
-  std::map<std::uint64_t, Attempt> attempts_;           // those that own their shards
-  std::set<std::string> drained_;                       // names of workers
+  std::map<std::uint64_t, Attempt> attempts_;        // those that own their shards
+  std::set<std::pair<Time, std::uint64_t>> leases_;  // by their ends
+  std::map<std::string, std::set<std::uint64_t>> attempts_of_worker_;  // by the worker's id
+  std::set<std::string> drained_;                                      // names of workers
   std::map<std::string, std::set<StageName>> blocked_;  // names of workers: kinds of tasks
   // The unfinished shards of all jobs, by the digest of their work.
   std::unordered_map<core::Digest, std::vector<ShardRef>, core::DigestHash> unfinished_;

@@ -21,18 +21,15 @@ AssignAction Queue::describe(const Attempt& attempt) const {
   return {attempt.job,         job.stages[attempt.stage].name,
           attempt.id,          attempt.token,
           attempt.first_shard, attempt.shards,
-          settings_.lease_ms,  Purpose::kFirst};
+          settings_.lease_ms,  attempt.purpose};
 }
 
 void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
   std::uint64_t held = 0;
   std::uint32_t free = report.free_attempts;
   // What the worker owns and did not list was in an answer that it never saw.
-  for (const auto& entry : attempts_) {
-    const Attempt& attempt = entry.second;
-    if (attempt.worker != report.worker) {
-      continue;
-    }
+  for (const Attempt* const owned : attempts_of(report.worker)) {
+    const Attempt& attempt = *owned;
     ++held;
     const bool is_listed =
         std::any_of(report.running.begin(), report.running.end(),
@@ -57,8 +54,8 @@ void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
     attempt.first_shard = run->first_shard;
     attempt.shards = run->shards;
     attempt.worker = worker.id;
+    attempt.worker_name = worker.name;
     attempt.token = make_token(stage, run->first_shard, run->shards);
-    attempt.lease_until = now + std::chrono::milliseconds(settings_.lease_ms);
     for (std::uint64_t i = 0; i < run->shards; ++i) {
       stage.shards[run->first_shard + i] = ShardState::kRunning;
     }
@@ -68,8 +65,9 @@ void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
     }
     job.phase = JobPhase::kRunning;
     ++job.revision;
-    actions.reply.assignments.push_back(describe(attempt));
-    attempts_[attempt.id] = std::move(attempt);
+    const Attempt& begun = begin_attempt(std::move(attempt), now);
+    actions.attempts_begun.push_back(record_of(begun));
+    actions.reply.assignments.push_back(describe(begun));
     ++held;
     if (stage.rate.empty()) {
       sample_rate(run->job_order, now);
@@ -185,9 +183,7 @@ std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
       continue;
     }
     ++workers;
-    const bool has_attempt = std::any_of(attempts_.begin(), attempts_.end(), [&](const auto& a) {
-      return a.second.worker == other.id;
-    });
+    const bool has_attempt = attempts_of_worker_.contains(other.id);
     if (other.id != worker.id && !has_attempt) {
       ++idle;
       idle_threads += other.threads;

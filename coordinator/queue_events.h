@@ -29,6 +29,8 @@ struct QueueSettings {
   std::uint32_t failure_limit = 5;
   std::uint32_t same_error_limit = 3;
   std::uint32_t lonely_loss_limit = 5;
+  // ... or so many lost workers of which nobody knows whether they survive other tasks.
+  std::uint32_t unconfirmed_loss_limit = 10;
   std::uint32_t retry_ms = 1'000;          // doubles with each failure of the shard
   std::uint32_t short_ms = 5'000;          // back-off when a resource is short; doubles up to ...
   std::uint32_t short_limit_ms = 300'000;  // ... this
@@ -51,6 +53,12 @@ struct QueueSettings {
   std::uint32_t ageing_ms = 300'000;    // waiting so long is worth one step of priority
   std::uint32_t user_jobs_limit = 200;  // unfinished jobs of one user
   std::uint32_t quarantine_limit = 16;  // a job with so many quarantined shards ends at once
+  std::uint32_t opinion_limit = 5;      // different results of a shard after which its job ends
+  // A worker with a wall-time limit gets work of unknown duration only while it has so much left.
+  std::uint32_t wall_margin_ms = 60'000;
+  // When no event came for so long, or the clock went back, the coordinator itself stood still or
+  // its clock was set: leases and waits then last as long as they still had to.
+  std::uint32_t stall_ms = 15'000;
 };
 
 // What a job asks of the scheduler.
@@ -93,6 +101,7 @@ struct BlockEvent {
   std::string worker_name;
   StageName stage = StageName::kGeometry;
   bool is_blocked = false;
+  bool is_liar = false;  // it gave wrong results
 };
 
 // The worker's connection has been closed for disconnect_ms.
@@ -297,7 +306,10 @@ struct BlockRecord {
   std::string worker;  // name
   StageName stage = StageName::kGeometry;
   bool is_blocked = true;
+  bool is_liar = false;  // it gave wrong results: none of its results of this kind are taken
 };
+// The same attempt may begin a second time: after a restart its worker came back with it when its
+// lease was over and nobody else ran its shards.
 struct AttemptRecord {
   std::string job;
   std::uint64_t attempt = 0;
@@ -336,13 +348,15 @@ struct BindRecord {
   core::Digest fingerprint;
 };
 
+// All records of one event are made durable together. A shard's result may be dropped and another
+// one recorded in the same event: results_dropped comes before results.
 struct Actions {
   std::vector<PlanAction> plan;
   std::vector<CommitAction> commit;
+  std::vector<ResultDropRecord> results_dropped;
   std::vector<ResultRecord> results;
   std::vector<FailureRecord> failures;
   std::vector<BindRecord> bound;
-  std::vector<ResultDropRecord> results_dropped;
   std::vector<AuditRecord> audits;
   std::vector<FailuresDropRecord> failures_dropped;
   std::vector<BlockRecord> blocks;

@@ -36,8 +36,19 @@ const char* to_string(Outcome outcome) {
   return "unknown";
 }
 
+bool Queue::is_drained(const std::string& worker_name) const {
+  return drained_.contains(worker_name);
+}
+
+std::vector<StageName> Queue::blocked_stages(const std::string& worker_name) const {
+  const auto blocked = blocked_.find(worker_name);
+  return blocked == blocked_.end()
+             ? std::vector<StageName>{}
+             : std::vector<StageName>(blocked->second.begin(), blocked->second.end());
+}
+
 // A paused job's attempts own nothing any more: their workers are told to stop when they report.
-void Queue::on(const PauseEvent& event, Time /*now*/, Actions& actions) {
+void Queue::on(const PauseEvent& event, Time now, Actions& actions) {
   JobState* const job = find_job(event.job);
   if (job == nullptr || job->has_ended() || job->is_paused == event.is_paused) {
     return;
@@ -46,13 +57,12 @@ void Queue::on(const PauseEvent& event, Time /*now*/, Actions& actions) {
   ++job->revision;
   actions.wake = true;
   if (job->is_paused) {
-    std::erase_if(attempts_, [&](const auto& entry) {
-      if (entry.second.job != job->id) {
-        return false;
+    for (const StageState& stage : job->stages) {
+      const std::set<std::uint64_t> attempts = stage.attempts;
+      for (const std::uint64_t id : attempts) {
+        release(end_attempt(id, Outcome::kStopped, "its job was paused", now, actions));
       }
-      release(entry.second);
-      return true;
-    });
+    }
   }
 }
 
@@ -86,12 +96,14 @@ void Queue::on(const BlockEvent& event, Time /*now*/, Actions& actions) {
 }
 
 void Queue::on(const DisconnectEvent& event, Time now, Actions& actions) {
-  for (auto& [id, attempt] : attempts_) {
-    if (attempt.worker == event.worker) {
-      attempt.lease_until = std::min(attempt.lease_until, now - std::chrono::milliseconds(1));
-    }
+  const auto held = attempts_of_worker_.find(event.worker);
+  if (held == attempts_of_worker_.end()) {
+    return;
   }
-  expire(now, actions);
+  const std::set<std::uint64_t> ids = held->second;
+  for (const std::uint64_t id : ids) {
+    lose(id, now, actions);
+  }
 }
 
 }  // namespace weft::coordinator

@@ -91,6 +91,9 @@ void Queue::on(const ReportEvent& event, Time now, Actions& actions) {
   worker.memory_bytes = event.memory_bytes;
   worker.fingerprint = event.fingerprint;
   worker.seen_at = now;
+  worker.labels = event.labels;
+  worker.wall_left_ms = event.wall_left_ms;
+  worker.scenes = event.scenes;
   bind_jobs(now, actions);
 
   for (const CompletionClaim& claim : event.completions) {
@@ -111,14 +114,10 @@ void Queue::on(const ReportEvent& event, Time now, Actions& actions) {
     }
   }
   if (event.leaving) {
-    std::erase_if(attempts_, [&](const auto& entry) {
-      if (entry.second.worker != event.worker) {
-        return false;
-      }
-      release(entry.second);
+    for (const Attempt* const attempt : attempts_of(event.worker)) {
+      release(end_attempt(attempt->id, Outcome::kStopped, "its worker left", now, actions));
       actions.wake = true;
-      return true;
-    });
+    }
     workers_.erase(event.worker);
   } else {
     assign(event, now, actions);
@@ -146,7 +145,10 @@ void Queue::complete(const ReportEvent& report, const CompletionClaim& claim, Ti
   }
 
   actions.reply.acknowledged.push_back({claim.job, claim.attempt});
-  const Attempt attempt = live->second;
+  live->second.shards_done = claim.results.size();
+  const Attempt attempt =
+      end_attempt(claim.attempt, claim.failure ? Outcome::kFailed : Outcome::kSucceeded,
+                  claim.failure ? claim.failure->message : "", now, actions);
   JobState& job = *find_job(attempt.job);
   take_results(job, attempt, claim, report.worker, now, actions);
   StageState& stage = job.stages[attempt.stage];
@@ -157,7 +159,6 @@ void Queue::complete(const ReportEvent& report, const CompletionClaim& claim, Ti
     stage.shard_thread_ms =
         stage.shard_thread_ms == 0 ? measured : 0.5 * (stage.shard_thread_ms + measured);
   }
-  attempts_.erase(attempt.id);
   release(attempt);
   if (stage.pending() > 0) {
     actions.wake = true;
@@ -200,7 +201,8 @@ void Queue::keep(const ReportEvent& report, const RunningClaim& claim, Time now,
     if (recognised == Recognised::kNotYet) {
       return;  // neither renewed nor stopped: its worker goes on while its lease lasts
     }
-    const bool is_adopted = recognised == Recognised::kYes && adopt(run, report.worker, now);
+    const bool is_adopted =
+        recognised == Recognised::kYes && adopt(run, report.worker, now, actions);
     if (!is_adopted) {
       actions.reply.stop.push_back({claim.job, claim.attempt});
       return;
@@ -214,23 +216,29 @@ void Queue::keep(const ReportEvent& report, const RunningClaim& claim, Time now,
   }
   if (!has_work) {  // others brought all of its results
     actions.reply.stop.push_back({claim.job, claim.attempt});
-    attempts_.erase(claim.attempt);
+    end_attempt(claim.attempt, Outcome::kSuperseded, "others brought its results", now, actions);
     return;
   }
-  attempt.lease_until = now + std::chrono::milliseconds(settings_.lease_ms);
-  if (attempt.shards_done != claim.shards_done) {
-    attempt.shards_done = claim.shards_done;
+  renew(attempt, now);
+  if (attempt.shards_done != claim.shards_done || attempt.last_line != claim.last_line) {
     ++find_job(attempt.job)->revision;
   }
+  if (attempt.shards_done != claim.shards_done || attempt.progress != claim.progress) {
+    attempt.progress_at = now;
+  }
+  attempt.shards_done = claim.shards_done;
+  attempt.progress = claim.progress;
+  attempt.last_line = claim.last_line;
   actions.reply.leases.push_back({claim.job, claim.attempt});
 }
 
 // Takes back an attempt that an earlier epoch gave out, if nobody else runs any of its shards.
-bool Queue::adopt(const Attempt& run, const std::string& worker, Time now) {
+bool Queue::adopt(const Attempt& run, const std::string& worker, Time now, Actions& actions) {
   const std::uint64_t epoch = next_attempt_ >> 32;
   JobState& job = *find_job(run.job);
   StageState& stage = job.stages[run.stage];
-  if (run.id >> 32 >= epoch || job.fingerprint != workers_.at(worker).fingerprint) {
+  if (run.id >> 32 >= epoch || job.is_paused ||
+      job.fingerprint != workers_.at(worker).fingerprint) {
     return false;
   }
   std::uint64_t pending = 0;
@@ -249,10 +257,10 @@ bool Queue::adopt(const Attempt& run, const std::string& worker, Time now) {
       ++stage.running;
     }
   }
-  Attempt& attempt = attempts_[run.id];
-  attempt = run;
+  Attempt attempt = run;
   attempt.worker = worker;
-  attempt.lease_until = now + std::chrono::milliseconds(settings_.lease_ms);
+  attempt.worker_name = workers_.at(worker).name;
+  actions.attempts_begun.push_back(record_of(begin_attempt(std::move(attempt), now)));
   job.phase = JobPhase::kRunning;
   if (job.started_at == Time{}) {
     job.started_at = now;

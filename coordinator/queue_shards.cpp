@@ -74,7 +74,12 @@ void Queue::release(const Attempt& attempt) {
 
 // The attempt's worker is gone: its shards go back. One that loses worker after worker while it
 // runs alone is taken for the cause.
-void Queue::lose(const Attempt& attempt, Time now, Actions& actions) {
+void Queue::lose(std::uint64_t id, Time now, Actions& actions) {
+  if (!attempts_.contains(id)) {
+    return;  // losing another one ended its job
+  }
+  const Attempt attempt = end_attempt(id, Outcome::kLost, "its worker fell silent", now, actions);
+  actions.wake = true;
   JobState& job = *find_job(attempt.job);
   StageState& stage = job.stages[attempt.stage];
   for (std::uint64_t i = 0; i < attempt.shards; ++i) {
@@ -99,18 +104,8 @@ void Queue::lose(const Attempt& attempt, Time now, Actions& actions) {
 }
 
 void Queue::expire(Time now, Actions& actions) {
-  std::vector<Attempt> lost;
-  for (const auto& [id, attempt] : attempts_) {
-    if (attempt.lease_until < now) {
-      lost.push_back(attempt);
-    }
-  }
-  for (const Attempt& attempt : lost) {
-    // Losing one attempt may have ended the job, and with it the others.
-    if (attempts_.erase(attempt.id) == 1) {
-      lose(attempt, now, actions);
-      actions.wake = true;
-    }
+  while (!leases_.empty() && leases_.begin()->first < now) {
+    lose(leases_.begin()->second, now, actions);
   }
 }
 
@@ -154,16 +149,14 @@ void Queue::back_off(const Attempt& attempt, const std::string& worker, Time now
 
 void Queue::sample_rate(std::uint64_t order, Time now) {
   JobState& job = jobs_.at(order);
-  for (std::size_t s = 0; s < job.stages.size(); ++s) {
-    StageState& stage = job.stages[s];
+  for (StageState& stage : job.stages) {
     if (stage.is_done()) {
       continue;
     }
     double shards = static_cast<double>(stage.done);
-    for (const auto& [id, attempt] : attempts_) {
-      if (attempt.job == job.id && attempt.stage == s) {
-        shards += static_cast<double>(std::min(attempt.shards_done, attempt.shards));
-      }
+    for (const std::uint64_t id : stage.attempts) {
+      const Attempt& attempt = attempts_.at(id);
+      shards += static_cast<double>(std::min(attempt.shards_done, attempt.shards));
     }
     if (!stage.rate.empty() && stage.rate.back().at == now) {
       stage.rate.back().shards = shards;

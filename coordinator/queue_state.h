@@ -48,6 +48,7 @@ struct StageState {
   std::uint64_t failures = 0;
   std::uint64_t first_pending = 0;  // no shard below is pending
   std::map<std::uint64_t, ShardTrouble> troubles;
+  std::set<std::uint64_t> attempts;         // live ones
   std::map<std::string, Backoff> backoffs;  // by worker
   double shard_thread_ms = 0;               // measured work of a shard on one thread; 0: unknown
   std::deque<RateSample> rate;
@@ -67,6 +68,18 @@ enum class JobPhase : std::uint8_t {
   kCancelled
 };
 
+// A shard that its job gave up, or of which two workers gave different results.
+struct Trouble {
+  enum class Kind : std::uint8_t { kQuarantined, kKiller, kMismatch };
+  Kind kind = Kind::kQuarantined;
+  StageName stage = StageName::kGeometry;
+  std::uint64_t shard = 0;
+  std::string message;               // in words: what, how often, where
+  std::vector<std::string> workers;  // names of those concerned, sorted
+  std::uint64_t attempt = 0;         // the last one, for its log; 0: unknown
+  std::string liar;                  // of a mismatch: who was wrong, when that is known
+};
+
 struct JobState {
   std::string id;
   std::string fabric;
@@ -84,6 +97,14 @@ struct JobState {
   Time started_at{};
   Time ended_at{};
   std::uint64_t revision = 0;
+  std::vector<Trouble> troubles;  // the oldest first
+  // Since the coordinator's start: reports of attempts that owned nothing any more, and the results
+  // taken from them; attempts of the two other purposes; audits that nobody could do.
+  std::uint64_t superseded_attempts = 0;
+  std::uint64_t superseded_results_used = 0;
+  std::uint64_t speculative_attempts = 0;
+  std::uint64_t audited_shards = 0;
+  std::uint64_t audits_given_up = 0;
 
   [[nodiscard]] bool has_ended() const {
     return phase == JobPhase::kSucceeded || phase == JobPhase::kFailed ||
@@ -97,10 +118,17 @@ struct Attempt {
   std::size_t stage = 0;  // index into JobState::stages
   std::uint64_t first_shard = 0;
   std::uint64_t shards = 0;
-  std::string worker;
+  std::string worker;  // id
+  std::string worker_name;
+  Purpose purpose = Purpose::kFirst;
   std::string token;
   Time lease_until{};
-  std::uint64_t shards_done = 0;  // as its worker says
+  Time began_at{};
+  // As its worker says.
+  std::uint64_t shards_done = 0;
+  std::uint64_t progress = 0;
+  Time progress_at{};  // when one of these two last changed
+  std::string last_line;
 };
 
 struct WorkerState {
@@ -112,6 +140,12 @@ struct WorkerState {
   Time seen_at{};
   std::uint64_t shards_done = 0;
   std::uint64_t failures = 0;
+  std::vector<std::string> labels;
+  std::uint64_t wall_left_ms = 0;  // when it was last seen; 0: no limit
+  std::vector<core::Digest> scenes;
+  std::uint64_t superseded = 0;  // attempts of which it reported when they were no longer its own
+  // Attempts about which all was said, for as long as the worker goes on naming them.
+  std::set<std::uint64_t> settled;
 };
 
 }  // namespace weft::coordinator

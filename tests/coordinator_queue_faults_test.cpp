@@ -231,6 +231,63 @@ TEST(QueueFaults, RestartedCoordinator_TakesItsWorkersBackWithWhatTheyRun) {
   EXPECT_EQ(after.job("a").stages[0].done, 2U);
 }
 
+// A cluster whose coordinator was killed while worker "w" ran the first two shards of job "a".
+class QueueRestart : public testing::Test {
+ protected:
+  QueueRestart() {
+    before_.submit("a", {6});
+    old_worker_.sync(1);
+    after_.prior_attempts = before_.open_attempts;
+  }
+
+  QueueCluster before_{{}, 1};
+  QueueWorker old_worker_{before_, "w", 2};
+  QueueCluster after_{{}, 2};
+  QueueWorker other_{after_, "other", 8};
+};
+
+TEST_F(QueueRestart, AttemptsFromBeforeIt_OwnTheirShardsBeforeTheirWorkerIsBack) {
+  ASSERT_EQ(before_.open_attempts.size(), 1U);
+  after_.submit("a", {6}, "", core::Digest{});
+  EXPECT_EQ(after_.job("a").stages[0].running, 2U);
+  after_.advance(20'000);
+  other_.sync(1);
+  ASSERT_EQ(other_.held.size(), 1U);
+  EXPECT_EQ(other_.held[0].first_shard, 2U);
+  EXPECT_EQ(other_.held[0].shards, 4U);
+  QueueWorker worker(after_, "w", 2);
+  Reply known;
+  known.assignments = old_worker_.held;
+  worker.receive(known);
+  const Reply reply = worker.sync();
+  ASSERT_EQ(reply.leases.size(), 1U);
+  EXPECT_TRUE(reply.stop.empty());
+  EXPECT_TRUE(after_.outcomes.empty());
+  EXPECT_EQ(after_.job("a").stages[0].failures, 0U);
+}
+
+TEST_F(QueueRestart, AttemptsWhoseWorkerStaysAway_AreLostAfterOneLease) {
+  after_.submit("a", {6}, "", core::Digest{});
+  after_.advance(30'001);
+  other_.sync(2);
+  EXPECT_EQ(after_.outcomes.at(old_worker_.held[0].attempt), Outcome::kLost);
+  std::uint64_t shards = 0;
+  for (const AssignAction& assign : other_.held) {
+    shards += assign.shards;
+  }
+  EXPECT_GE(shards, 5U);
+}
+
+TEST_F(QueueRestart, AttemptsWhoseResultsAreThere_AreOver) {
+  for (std::uint64_t shard = 0; shard < 2; ++shard) {
+    const core::Digest work = QueueCluster::work("a", 0, shard);
+    after_.cache[work] = QueueCluster::result_of(work);
+  }
+  after_.submit("a", {6}, "", core::Digest{});
+  EXPECT_TRUE(after_.queue.attempts().empty());
+  EXPECT_EQ(after_.outcomes.at(old_worker_.held[0].attempt), Outcome::kSuperseded);
+}
+
 TEST(QueueFaults, CompletionFromBeforeARestart_WaitsForThePlanAndIsTaken) {
   QueueCluster before({}, 1);
   QueueWorker old_worker(before, "w", 6);
@@ -316,6 +373,11 @@ class QueueSimulation : public testing::TestWithParam<std::uint64_t> {
   }
 
   void check_invariants() const {
+    ASSERT_EQ(cluster_->open_attempts.size(), cluster_->queue.attempts().size());
+    for (const auto& [id, attempt] : cluster_->queue.attempts()) {
+      ASSERT_TRUE(cluster_->open_attempts.contains(id));
+      ASSERT_GE(attempt.lease_until, cluster_->now);
+    }
     for (const JobState* job : cluster_->queue.jobs()) {
       for (const StageState& stage : job->stages) {
         std::uint64_t running = 0;

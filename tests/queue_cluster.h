@@ -41,6 +41,13 @@ class QueueCluster {
       results_recorded[record.shard] += 1;
       cache[record.shard] = record.result;
     }
+    for (const AttemptRecord& record : actions.attempts_begun) {
+      open_attempts[record.attempt] = record;
+    }
+    for (const AttemptEndRecord& record : actions.attempts_ended) {
+      open_attempts.erase(record.attempt);
+      outcomes[record.attempt] = record.outcome;
+    }
     for (const std::string& job : actions.ended) {
       ended.push_back(job);
     }
@@ -75,6 +82,12 @@ class QueueCluster {
           stage.known.push_back({i, known->second, {}, false});
         }
       }
+      for (const auto& [id, attempt] : prior_attempts) {
+        if (attempt.job == plan.job && attempt.stage == stage.name) {
+          stage.attempts.push_back({id, attempt.first_shard, attempt.shards, attempt.worker,
+                                    attempt.worker_name, attempt.purpose});
+        }
+      }
       event.stages.push_back(std::move(stage));
     }
     apply(event);
@@ -94,6 +107,10 @@ class QueueCluster {
   std::map<core::Digest, core::Digest> cache;
   std::map<core::Digest, int> results_recorded;
   std::vector<std::string> ended;
+  // As a journal has them: what runs, how it ended, and what ran before a restart.
+  std::map<std::uint64_t, AttemptRecord> open_attempts;
+  std::map<std::uint64_t, Outcome> outcomes;
+  std::map<std::uint64_t, AttemptRecord> prior_attempts;
 
  private:
   std::map<std::string, std::pair<std::vector<std::uint64_t>, std::string>> plans_;
