@@ -1,42 +1,79 @@
 #include "coordinator/blob_service.h"
 
-#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 
+#include "coordinator/messages.h"
 #include "coordinator/rpc.h"
+#include "core/clock.h"
+#include "core/error.h"
 #include "proto/limits.h"
+#include "storage/blob_reader.h"
 
 namespace weft::coordinator {
+
+namespace {
+
+constexpr std::uint64_t kUploadsBetweenSweeps = 256;
+
+}  // namespace
+
+BlobService::BlobService(Scheduler& scheduler)
+    : scheduler_(scheduler), uploads_(scheduler.blobs()) {
+  sweep_sometimes();
+}
+
+void BlobService::sweep_sometimes() {
+  if (begun_++ % kUploadsBetweenSweeps == 0) {
+    const std::int64_t now_ms = to_ms(core::system_clock().now());
+    uploads_.sweep(now_ms - storage::UploadLimits().kept_ms);
+  }
+}
 
 grpc::Status BlobService::Read(grpc::ServerContext* context, const v1::ReadRequest* request,
                                grpc::ServerWriter<v1::ReadResponse>* writer) {
   return answer(*context, "BlobService.Read", [&]() -> grpc::Status {
     const core::Digest digest = digest_from(request->digest(), "digest");
-    const bool was_there = scheduler_.blobs().has(digest);
-    const std::optional<std::string> blob = scheduler_.blobs().get(digest);
+    std::optional<storage::BlobReader> blob = storage::BlobReader::open(scheduler_.blobs(), digest);
     if (!blob) {
       scheduler_.result_lost(digest);
-      return was_there
-                 ? grpc::Status(grpc::StatusCode::DATA_LOSS, "blob " + digest.hex() +
-                                                                 " was damaged on disk; whatever "
-                                                                 "made it will be computed again")
-                 : grpc::Status(grpc::StatusCode::NOT_FOUND, "no blob " + digest.hex());
+      return {grpc::StatusCode::NOT_FOUND, "no blob " + digest.hex()};
     }
-    if (request->offset() > blob->size()) {
+    if (request->offset() > blob->size_bytes()) {
       return {grpc::StatusCode::OUT_OF_RANGE,
-              "offset is beyond the blob's " + std::to_string(blob->size()) + " bytes"};
+              "offset is beyond the blob's " + std::to_string(blob->size_bytes()) + " bytes"};
     }
-    v1::ReadResponse response;
-    response.set_size_bytes(blob->size());
-    std::size_t at = request->offset();
-    do {
-      const std::size_t count = std::min(v1::kChunkLimitBytes, blob->size() - at);
-      response.set_data(blob->data() + at, count);
-      at += count;
-      if (!writer->Write(response)) {
-        return {grpc::StatusCode::CANCELLED, "the caller went away"};
+    try {
+      blob->skip(request->offset());
+      v1::ReadResponse response;
+      response.set_size_bytes(blob->size_bytes());
+      do {
+        *response.mutable_data() = blob->read(v1::kChunkLimitBytes);
+        if (!writer->Write(response)) {
+          return {grpc::StatusCode::CANCELLED, "the caller went away"};
+        }
+        response.clear_size_bytes();
+      } while (!blob->is_over());
+    } catch (const core::Error& error) {
+      if (error.code() == core::Code::kDataLoss) {
+        scheduler_.result_lost(digest);
       }
-      response.clear_size_bytes();
-    } while (at < blob->size());
+      throw;
+    }
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status BlobService::QueryWrite(grpc::ServerContext* context,
+                                     const v1::QueryWriteRequest* request,
+                                     v1::QueryWriteResponse* response) {
+  return answer(*context, "BlobService.QueryWrite", [&]() -> grpc::Status {
+    const core::Digest digest = digest_from(request->digest(), "digest");
+    const std::optional<std::uint64_t> size_bytes = scheduler_.blobs().use(digest);
+    response->set_complete(size_bytes.has_value());
+    response->set_committed_bytes(size_bytes ? *size_bytes : uploads_.committed_bytes(digest));
     return grpc::Status::OK;
   });
 }
@@ -50,31 +87,53 @@ grpc::Status BlobService::Write(grpc::ServerContext* context,
       return {grpc::StatusCode::INVALID_ARGUMENT, "the stream has no message"};
     }
     const core::Digest digest = digest_from(request.digest(), "digest");
-    const std::uint64_t size = request.size_bytes();
-    if (size > v1::kBlobLimitBytes) {
-      return {grpc::StatusCode::RESOURCE_EXHAUSTED,
-              "the blob has " + std::to_string(size) + " bytes; the limit is 1 GiB"};
+    if (request.size_bytes() > v1::kBlobLimitBytes) {
+      return {
+          grpc::StatusCode::RESOURCE_EXHAUSTED,
+          "the blob has " + std::to_string(request.size_bytes()) + " bytes; the limit is 1 GiB"};
     }
-    if (scheduler_.blobs().has(digest)) {
+    // One of another size is damaged, and is replaced.
+    if (scheduler_.blobs().use(digest) == request.size_bytes()) {
       return grpc::Status::OK;
     }
-    std::string data;
-    do {
-      if (request.data().size() > v1::kChunkLimitBytes) {
-        return {grpc::StatusCode::INVALID_ARGUMENT, "a chunk is larger than 1 MiB"};
+    // Most results come in one message, and need no file for what has come.
+    if (request.offset() == 0 && request.data().size() == request.size_bytes() &&
+        request.data().size() <= v1::kChunkLimitBytes) {
+      if (core::digest_of(request.data()) != digest) {
+        return {grpc::StatusCode::DATA_LOSS,
+                "the bytes are not those of blob " + digest.hex() + "; nothing was stored"};
       }
-      data += request.data();
-      if (data.size() > size) {
-        return {grpc::StatusCode::DATA_LOSS, "more bytes came than were announced"};
-      }
-    } while (reader->Read(&request));
-    if (data.size() != size || core::digest_of(data) != digest) {
-      return {grpc::StatusCode::DATA_LOSS,
-              "the bytes are not those of blob " + digest.hex() + "; nothing was stored"};
+      scheduler_.blobs().put(request.data());
+      return grpc::Status::OK;
     }
-    scheduler_.blobs().put(data);
-    return grpc::Status::OK;
+    return receive(digest, request, *reader);
   });
+}
+
+grpc::Status BlobService::receive(const core::Digest& digest, v1::WriteRequest& request,
+                                  grpc::ServerReader<v1::WriteRequest>& reader) {
+  sweep_sometimes();
+  const std::uint64_t offset = request.offset();
+  if (offset != 0 &&
+      (offset != uploads_.committed_bytes(digest) || offset > request.size_bytes())) {
+    return {grpc::StatusCode::OUT_OF_RANGE, "the upload may begin at 0 or go on at " +
+                                                std::to_string(uploads_.committed_bytes(digest)) +
+                                                ", not at " + std::to_string(offset)};
+  }
+  const std::unique_ptr<storage::BlobUpload> upload =
+      uploads_.begin(digest, request.size_bytes(), offset);
+  if (upload == nullptr) {
+    return {grpc::StatusCode::ABORTED,
+            "another upload of blob " + digest.hex() + " is under way; ask QueryWrite in a while"};
+  }
+  do {
+    if (request.data().size() > v1::kChunkLimitBytes) {
+      return {grpc::StatusCode::INVALID_ARGUMENT, "a chunk is larger than 1 MiB"};
+    }
+    upload->add(request.data());
+  } while (reader.Read(&request));
+  upload->finish();
+  return grpc::Status::OK;
 }
 
 }  // namespace weft::coordinator

@@ -1,21 +1,34 @@
 #pragma once
 
+#include <atomic>
+#include <cstdint>
+
 #include "coordinator/scheduler.h"
 #include "proto/weft/v1/cluster.grpc.pb.h"
+#include "storage/blob_uploads.h"
 
 namespace weft::coordinator {
 
-// Results and inputs by digest. Contracts: cluster.proto.
+// Results and inputs by digest. A call holds one chunk of its blob in memory. Contracts:
+// cluster.proto.
 class BlobService final : public v1::BlobService::Service {
  public:
-  explicit BlobService(Scheduler& scheduler) : scheduler_(scheduler) {}
+  explicit BlobService(Scheduler& scheduler);
   grpc::Status Read(grpc::ServerContext* context, const v1::ReadRequest* request,
                     grpc::ServerWriter<v1::ReadResponse>* writer) override;
+  grpc::Status QueryWrite(grpc::ServerContext* context, const v1::QueryWriteRequest* request,
+                          v1::QueryWriteResponse* response) override;
   grpc::Status Write(grpc::ServerContext* context, grpc::ServerReader<v1::WriteRequest>* reader,
                      v1::WriteResponse* response) override;
 
  private:
+  grpc::Status receive(const core::Digest& digest, v1::WriteRequest& request,
+                       grpc::ServerReader<v1::WriteRequest>& reader);
+  void sweep_sometimes();
+
   Scheduler& scheduler_;
+  storage::BlobUploads uploads_;
+  std::atomic<std::uint64_t> begun_{0};
 };
 
 }  // namespace weft::coordinator

@@ -1,6 +1,11 @@
 #include "storage/blob_store.h"
 
+#include <algorithm>
 #include <system_error>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/stat.h>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -8,6 +13,10 @@
 namespace weft::storage {
 
 namespace {
+
+constexpr const char* kTrash = "trash";
+constexpr std::int64_t kMsPerSecond = 1000;
+constexpr std::int64_t kNsPerMs = 1'000'000;
 
 void make_folder(const std::filesystem::path& folder) {
   std::error_code failure;
@@ -18,6 +27,56 @@ void make_folder(const std::filesystem::path& folder) {
   }
 }
 
+// By the clock of the file system, which is that of core::system_clock.
+bool touch(const std::filesystem::path& path) {
+  return ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0) == 0;
+}
+
+struct FileFacts {
+  std::uint64_t size_bytes = 0;
+  std::int64_t modified_at_ms = 0;
+};
+
+std::optional<FileFacts> facts_of(const std::filesystem::path& path) {
+  struct stat facts {};
+  if (::stat(path.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode)) {
+    return std::nullopt;
+  }
+  return FileFacts{static_cast<std::uint64_t>(facts.st_size),
+                   facts.st_mtim.tv_sec * kMsPerSecond + facts.st_mtim.tv_nsec / kNsPerMs};
+}
+
+// Names of what a folder holds, sorted; nothing when it is not there.
+std::vector<std::string> names_in(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code failure;
+  for (const auto& item : std::filesystem::directory_iterator(folder, failure)) {
+    names.push_back(item.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+void visit_folder(const std::filesystem::path& folder, const BlobStore::Visit& visit) {
+  for (const std::string& first : names_in(folder)) {
+    if (first.size() != 2) {
+      continue;  // the trash
+    }
+    for (const std::string& rest : names_in(folder / first)) {
+      const std::optional<core::Digest> digest = core::Digest::from_hex(first + rest);
+      const std::optional<FileFacts> facts = facts_of(folder / first / rest);
+      if (digest && facts) {
+        visit({*digest, facts->size_bytes, facts->modified_at_ms});
+      }
+    }
+  }
+}
+
+std::filesystem::path path_in(const std::filesystem::path& folder, const core::Digest& digest) {
+  const std::string hex = digest.hex();
+  return folder / hex.substr(0, 2) / hex.substr(2);
+}
+
 }  // namespace
 
 BlobStore::BlobStore(std::filesystem::path folder) : folder_(std::move(folder)) {
@@ -25,29 +84,40 @@ BlobStore::BlobStore(std::filesystem::path folder) : folder_(std::move(folder)) 
 }
 
 std::filesystem::path BlobStore::path_of(const core::Digest& digest) const {
-  const std::string hex = digest.hex();
-  return folder_ / hex.substr(0, 2) / hex.substr(2);
+  return path_in(folder_, digest);
+}
+
+std::filesystem::path BlobStore::trash_path_of(const core::Digest& digest) const {
+  return path_in(folder_ / kTrash, digest);
 }
 
 core::Digest BlobStore::put(std::string_view data) {
   const core::Digest digest = core::digest_of(data);
-  const std::filesystem::path path = path_of(digest);
-  std::error_code failure;
   // A file of another length is damaged and is written again; one of the right length is trusted
   // here and checked by get().
-  if (std::filesystem::file_size(path, failure) == data.size() && !failure) {
+  if (use(digest) == data.size()) {
     return digest;
   }
+  const std::filesystem::path path = path_of(digest);
   make_folder(path.parent_path());
   core::write_file_atomically(path, data);
   return digest;
 }
 
-std::optional<std::string> BlobStore::get(const core::Digest& digest) const {
+void BlobStore::adopt(const std::filesystem::path& file, const core::Digest& digest) {
   const std::filesystem::path path = path_of(digest);
+  make_folder(path.parent_path());
+  touch(file);
+  core::publish_file(file, path);
+}
+
+std::optional<std::string> BlobStore::get(const core::Digest& digest) const {
+  if (!has(digest) && !use(digest)) {
+    return std::nullopt;
+  }
   std::string data;
   try {
-    data = core::read_file(path);
+    data = core::read_file(path_of(digest));
   } catch (const core::Error& error) {
     if (error.code() == core::Code::kNotFound) {
       return std::nullopt;
@@ -55,16 +125,68 @@ std::optional<std::string> BlobStore::get(const core::Digest& digest) const {
     throw;
   }
   if (core::digest_of(data) != digest) {
-    std::error_code failure;
-    std::filesystem::remove(path, failure);
+    remove(digest);
     return std::nullopt;
   }
   return data;
 }
 
 bool BlobStore::has(const core::Digest& digest) const {
+  return facts_of(path_of(digest)).has_value();
+}
+
+std::optional<std::uint64_t> BlobStore::use(const core::Digest& digest) const {
+  const std::filesystem::path path = path_of(digest);
+  const std::lock_guard lock(mutex_);
+  if (!touch(path) && !restore(digest)) {
+    return std::nullopt;
+  }
+  const std::optional<FileFacts> facts = facts_of(path);
+  return facts ? std::optional(facts->size_bytes) : std::nullopt;
+}
+
+bool BlobStore::restore(const core::Digest& digest) const {
+  const std::filesystem::path kept = trash_path_of(digest);
+  if (!touch(kept)) {
+    return false;
+  }
+  const std::filesystem::path path = path_of(digest);
+  make_folder(path.parent_path());
   std::error_code failure;
-  return std::filesystem::is_regular_file(path_of(digest), failure);
+  std::filesystem::rename(kept, path, failure);
+  return !failure;
+}
+
+void BlobStore::remove(const core::Digest& digest) const {
+  std::error_code gone_already;
+  std::filesystem::remove(path_of(digest), gone_already);
+}
+
+void BlobStore::visit(const Visit& visit) const { visit_folder(folder_, visit); }
+
+void BlobStore::visit_trash(const Visit& visit) const { visit_folder(folder_ / kTrash, visit); }
+
+bool BlobStore::trash(const core::Digest& digest, std::int64_t before_ms) const {
+  const std::filesystem::path path = path_of(digest);
+  const std::filesystem::path kept = trash_path_of(digest);
+  make_folder(kept.parent_path());
+  const std::lock_guard lock(mutex_);
+  const std::optional<FileFacts> facts = facts_of(path);
+  // Touched first: the time in the trash counts from now even if the process dies in between.
+  if (!facts || facts->modified_at_ms >= before_ms || !touch(path)) {
+    return false;
+  }
+  std::error_code failure;
+  std::filesystem::rename(path, kept, failure);
+  return !failure;
+}
+
+bool BlobStore::empty(const core::Digest& digest, std::int64_t before_ms) const {
+  const std::filesystem::path kept = trash_path_of(digest);
+  const std::lock_guard lock(mutex_);
+  const std::optional<FileFacts> facts = facts_of(kept);
+  std::error_code failure;
+  return facts && facts->modified_at_ms < before_ms && std::filesystem::remove(kept, failure);
 }
 
 }  // namespace weft::storage

@@ -354,9 +354,11 @@ TEST_F(Service, Blobs_AreWrittenOnceCheckedAndReadFromAnywhere) {
   EXPECT_EQ(write(blob, core::digest_of("another"), &response).error_code(),
             grpc::StatusCode::DATA_LOSS);
   ASSERT_TRUE(write(blob, digest, &response).ok());
-  const auto written = std::filesystem::last_write_time(scheduler_->blobs().path_of(digest));
+  // A second name shows whether the file is replaced.
+  const std::filesystem::path beside = folder_ / "beside";
+  std::filesystem::create_hard_link(scheduler_->blobs().path_of(digest), beside);
   ASSERT_TRUE(write(blob, digest, &response).ok());
-  EXPECT_EQ(std::filesystem::last_write_time(scheduler_->blobs().path_of(digest)), written);
+  EXPECT_TRUE(std::filesystem::equivalent(scheduler_->blobs().path_of(digest), beside));
   std::string data;
   ASSERT_TRUE(read(digest, 0, &data).ok());
   EXPECT_EQ(data, blob);

@@ -1,0 +1,124 @@
+#include <string>
+#include <thread>
+
+#include "tests/coordinator_service_fixture.h"
+
+// Uploads and downloads of blobs that break off, over a real connection.
+
+namespace weft::coordinator {
+namespace {
+
+class Blobs : public ServiceTest {
+ protected:
+  // Sends `size` bytes from `offset` on, in chunks; all of them announced.
+  grpc::Status send(std::uint64_t offset, std::uint64_t size, bool is_broken_off = false) {
+    grpc::ClientContext context;
+    v1::WriteResponse response;
+    const auto writer = blobs_->Write(&context, &response);
+    v1::WriteRequest request;
+    request.set_digest(digest_.binary());
+    request.set_size_bytes(data_.size());
+    request.set_offset(offset);
+    for (std::uint64_t at = offset; at < offset + size; at += 1 << 16) {
+      request.set_data(data_.substr(at, std::min<std::uint64_t>(1 << 16, offset + size - at)));
+      if (!writer->Write(request)) {
+        break;
+      }
+      request.Clear();
+    }
+    if (is_broken_off) {
+      wait_until_committed(offset + size);
+      context.TryCancel();
+    } else {
+      writer->WritesDone();
+    }
+    return writer->Finish();
+  }
+  v1::QueryWriteResponse query() {
+    grpc::ClientContext context;
+    v1::QueryWriteRequest request;
+    request.set_digest(digest_.binary());
+    v1::QueryWriteResponse response;
+    EXPECT_TRUE(blobs_->QueryWrite(&context, request, &response).ok());
+    return response;
+  }
+  void wait_until_committed(std::uint64_t bytes) {
+    for (int i = 0; i < 2'000 && query().committed_bytes() < bytes; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_EQ(query().committed_bytes(), bytes);
+  }
+  // The broken stream's handler may still hold the upload.
+  grpc::Status send_when_free(std::uint64_t offset, std::uint64_t size) {
+    grpc::Status status;
+    for (int i = 0; i < 2'000; ++i) {
+      status = send(offset, size);
+      if (status.error_code() != grpc::StatusCode::ABORTED) {
+        break;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return status;
+  }
+
+  const std::string data_ = [] {
+    std::string data(1'000'000, '\0');
+    for (std::size_t i = 0; i < data.size(); ++i) {
+      data[i] = static_cast<char>((i * i) >> 7 & 0xff);
+    }
+    return data;
+  }();
+  const core::Digest digest_ = core::digest_of(data_);
+};
+
+TEST_F(Blobs, BrokenUploadGoesOnWhereItWas) {
+  EXPECT_FALSE(query().complete());
+  EXPECT_FALSE(send(0, 300'000, true).ok());
+  EXPECT_EQ(send_when_free(299'999, 1).error_code(), grpc::StatusCode::OUT_OF_RANGE);
+  stop();
+  start();
+  ASSERT_EQ(query().committed_bytes(), 300'000U);
+  const grpc::Status status = send_when_free(300'000, data_.size() - 300'000);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_TRUE(query().complete());
+  EXPECT_EQ(query().committed_bytes(), data_.size());
+  std::string read_back;
+  EXPECT_TRUE(read(digest_, 0, &read_back).ok());
+  EXPECT_EQ(read_back, data_);
+  read_back.clear();
+  EXPECT_TRUE(read(digest_, 999'000, &read_back).ok());
+  EXPECT_EQ(read_back, data_.substr(999'000));
+}
+
+TEST_F(Blobs, UploadOfWhatIsThereSucceedsAtOnce) {
+  ASSERT_TRUE(send(0, data_.size()).ok());
+  EXPECT_TRUE(send(0, 1 << 16).ok()) << "without the rest of the bytes";
+}
+
+TEST_F(Blobs, SecondUploadAtOnceIsToldToWait) {
+  grpc::ClientContext context;
+  v1::WriteResponse response;
+  const auto writer = blobs_->Write(&context, &response);
+  v1::WriteRequest request;
+  request.set_digest(digest_.binary());
+  request.set_size_bytes(data_.size());
+  request.set_data(data_.substr(0, 1000));
+  writer->Write(request);
+  wait_until_committed(1000);
+  EXPECT_EQ(send(0, data_.size()).error_code(), grpc::StatusCode::ABORTED);
+  request.Clear();
+  request.set_data(data_.substr(1000));
+  writer->Write(request);
+  writer->WritesDone();
+  EXPECT_TRUE(writer->Finish().ok());
+  EXPECT_TRUE(send(0, data_.size()).ok());
+}
+
+TEST_F(Blobs, UploadThatEndsEarlyStoresNothingAndKeepsWhatCame) {
+  EXPECT_EQ(send(0, 100'000).error_code(), grpc::StatusCode::DATA_LOSS);
+  EXPECT_FALSE(query().complete());
+  EXPECT_EQ(query().committed_bytes(), 100'000U);
+}
+
+}  // namespace
+}  // namespace weft::coordinator
