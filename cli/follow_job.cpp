@@ -72,11 +72,22 @@ class JobFollower {
         printer_.note("waiting for " + waiting_for_);
       }
     }
+    for (; troubles_shown_ < job_.troubles_size(); ++troubles_shown_) {
+      printer_.note(trouble_text(job_.troubles(troubles_shown_)));
+    }
     if (job_.state() == v1::JOB_STATE_COMMITTING && !is_committing_) {
       is_committing_ = true;
       printer_.note("all results are there; the database is being written");
     }
     printer_.update(stages_of(job_));
+  }
+
+  [[nodiscard]] std::string trouble_text(const v1::Trouble& trouble) const {
+    const std::string log = trouble.attempt() == 0
+                                ? ""
+                                : "; weft logs " + job_.id() + " --attempt " +
+                                      std::to_string(trouble.attempt()) + " shows its log";
+    return trouble.message() + log;
   }
 
   void wait_for_coordinator(const grpc::Status& status) {
@@ -100,6 +111,7 @@ class JobFollower {
   v1::Job job_;
   std::string waiting_for_;
   core::Stopwatch since_away_;
+  int troubles_shown_ = 0;
   bool has_seen_job_ = false;
   bool is_away_ = false;
   bool is_committing_ = false;

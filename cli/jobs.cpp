@@ -17,7 +17,9 @@ namespace {
 
 constexpr const char* kHelp =
     "List the coordinator's jobs, newest first.\n"
-    "Times are UTC. SHARDS counts the units of work of the stages planned so far.\n"
+    "Times are UTC. SHARDS counts the units of work of the stages planned so far. 'weft explain "
+    "job\n"
+    "JOB' says why one waits.\n"
     "Example: weft jobs --unfinished";
 
 struct JobsOptions {
@@ -46,10 +48,11 @@ void run(const JobsOptions& options) {
     print_json(to_json_array(response.jobs()));
     return;
   }
-  Table table({"JOB", "FABRIC", "STATE", "SHARDS", "SUBMITTED", "REMARK"});
+  Table table({"JOB", "FABRIC", "USER", "PRIORITY", "STATE", "SHARDS", "SUBMITTED", "REMARK"});
   for (const v1::Job& job : response.jobs()) {
-    table.add({job.id(), job.fabric(), state_text(job.state()), shards_text(job),
-               time_text(job.submitted_at_ms()), remark(job)});
+    table.add({job.id(), job.fabric(), job.user().empty() ? "-" : job.user(),
+               std::to_string(job.priority()), job.paused() ? "paused" : state_text(job.state()),
+               shards_text(job), time_text(job.submitted_at_ms()), remark(job)});
   }
   fmt::print("{}", table.text());
 }
