@@ -7,8 +7,6 @@
 #include <thread>
 
 #include <CLI/CLI.hpp>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -17,11 +15,14 @@
 #include "core/interrupt.h"
 #include "proto/address.h"
 #include "proto/limits.h"
+#include "security/channel.h"
+#include "security/endpoint_options.h"
 #include "worker/lease_loop.h"
 
 namespace {
 
 constexpr unsigned kMiB = 1U << 20U;
+constexpr int kLongestReconnectMs = 2000;
 
 std::string host_name() {
   std::string name(256, '\0');
@@ -45,7 +46,7 @@ std::string default_scratch() {
 }
 
 struct Flags {
-  std::string coordinator = "127.0.0.1:7411";
+  weft::security::Endpoint coordinator = "127.0.0.1:7411";
   std::string log_level = "info";
   std::uint64_t scratch_limit_mib = 4096;
   weft::worker::WorkerOptions worker;
@@ -57,10 +58,11 @@ void declare(CLI::App& app, Flags& flags) {
   flags.worker.scratch = default_scratch();
   flags.worker.memory_bytes = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
                               static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-  app.add_option("--coordinator", flags.coordinator, "Address: host:port or unix:/path")
+  app.add_option("--coordinator", flags.coordinator.address, "Address: host:port or unix:/path")
       ->envname("WEFT_COORDINATOR")
       ->check(CLI::Validator(weft::v1::mistake_in_address, "", "address"))
       ->capture_default_str();
+  weft::security::add_security_options(app, flags.coordinator);
   app.add_option("--name", flags.worker.name, "Name for people, at most 128 characters")
       ->check([](const std::string& name) {
         return !name.empty() && name.size() <= weft::v1::kNameLimitBytes
@@ -95,16 +97,10 @@ void work(Flags flags) {
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
   weft::core::Interrupt interrupt;  // before any thread is started
   flags.worker.scratch_limit_bytes = flags.scratch_limit_mib * kMiB;
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(weft::v1::kMessageLimitBytes);
-  arguments.SetMaxSendMessageSize(weft::v1::kMessageLimitBytes);
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // The coordinator may be restarted at any time; gRPC's own waits grow to minutes.
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 200);
   weft::worker::LeaseLoop loop(
       std::move(flags.worker),
-      grpc::CreateCustomChannel(flags.coordinator, grpc::InsecureChannelCredentials(), arguments));
+      weft::security::open_channel(flags.coordinator, kLongestReconnectMs));
   loop.run([&] { return interrupt.requested(); });
 }
 
