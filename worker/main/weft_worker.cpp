@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -45,6 +46,14 @@ std::string default_scratch() {
              : (std::filesystem::temp_directory_path() / "weft-worker").string();
 }
 
+std::string mistake_in_label(const std::string& label) {
+  const bool is_good = !label.empty() && label.size() <= weft::v1::kIdLimit &&
+                       label.find_first_not_of(
+                           "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwx"
+                           "yz0123456789_.=-") == std::string::npos;
+  return is_good ? std::string() : "a label is 1 to 64 characters of A-Z, a-z, 0-9, _, ., = and -";
+}
+
 struct Flags {
   weft::security::Endpoint coordinator = "127.0.0.1:7411";
   std::string log_level = "info";
@@ -74,10 +83,26 @@ void declare(CLI::App& app, Flags& flags) {
       ->check(CLI::Range(1U, weft::v1::kThreadsLimit))
       ->capture_default_str();
   app.add_option("--scratch", flags.worker.scratch,
-                 "Folder for inputs that are used again; may be shared between workers")
+                 "Folder for inputs that are used again and results until they are acknowledged; "
+                 "may be shared between workers")
       ->capture_default_str();
-  app.add_option("--scratch-limit", flags.scratch_limit_mib, "How much to keep there, in MiB")
+  app.add_option("--scratch-limit", flags.scratch_limit_mib,
+                 "How much of inputs to keep there, in MiB")
       ->check(CLI::Range(std::uint64_t{16}, std::uint64_t{1} << 30U))
+      ->capture_default_str();
+  app.add_option("--label", flags.worker.labels,
+                 "What jobs may ask for, as in gpu or room=12; may be repeated")
+      ->check(CLI::Validator(mistake_in_label, "", "label"))
+      ->expected(1, static_cast<int>(weft::v1::kLabelsLimit));
+  app.add_option("--wall-limit", flags.worker.wall_limit_seconds,
+                 "Ends by itself before it has run for so many seconds, and takes no task that is "
+                 "not expected to end before; 0: none")
+      ->check(CLI::Range(0.0, 1e8))
+      ->capture_default_str();
+  app.add_option("--exit-when-idle", flags.worker.idle_limit_seconds,
+                 "Ends when it had nothing to do for so many seconds, as when it is drained; 0: "
+                 "never")
+      ->check(CLI::Range(0.0, 1e8))
       ->capture_default_str();
   app.add_option("--log-level", flags.log_level, "error, warn, info or debug")
       ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
@@ -86,7 +111,10 @@ void declare(CLI::App& app, Flags& flags) {
       "Computes shards for a coordinator until it is told to end. SIGTERM or Ctrl-C: begins "
       "nothing\nmore, reports what is done and ends within ten seconds; a second one ends it at "
       "once. While the\ncoordinator is away the worker goes on with what it has and tries again.\n"
-      "Exits with 0 when it was told to end, 1 when the coordinator refuses it.\n"
+      "Results that the coordinator has not acknowledged stay in the scratch folder, and are\n"
+      "reported by the next worker that is started on it.\n"
+      "Exits with 0 when it was told to end, 1 when the coordinator refuses it or every thread\n"
+      "hangs.\n"
       "Example: weft-worker --coordinator 127.0.0.1:7411 --threads 4");
 }
 
@@ -96,6 +124,13 @@ void work(Flags flags) {
   spdlog::set_default_logger(log);
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
   weft::core::Interrupt interrupt;  // before any thread is started
+  // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
+  std::signal(SIGXFSZ, SIG_IGN);
+  flags.worker.coordinator = flags.coordinator;
+  flags.worker.end_process = [](int code) {
+    spdlog::shutdown();
+    std::_Exit(code);
+  };
   flags.worker.scratch_limit_bytes = flags.scratch_limit_mib * kMiB;
   // The coordinator may be restarted at any time; gRPC's own waits grow to minutes.
   weft::worker::LeaseLoop loop(
