@@ -126,7 +126,7 @@ void work(Flags flags) {
   weft::core::Interrupt interrupt;  // before any thread is started
   // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
   std::signal(SIGXFSZ, SIG_IGN);
-  flags.worker.coordinator = flags.coordinator;
+  flags.worker.coordinator = flags.coordinator.address;
   flags.worker.end_process = [](int code) {
     spdlog::shutdown();
     std::_Exit(code);
