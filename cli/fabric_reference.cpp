@@ -75,8 +75,7 @@ std::filesystem::path environment_cache_folder() {
   return folder.empty() ? folder : folder / "environments";
 }
 
-std::filesystem::path resolve_fabric(const std::string& reference,
-                                     const security::Endpoint& coordinator) {
+std::filesystem::path resolve_fabric(const std::string& reference, const std::string& coordinator) {
   const std::optional<FabricReference> parsed = parse_reference(reference);
   if (!parsed) {
     std::error_code failure;

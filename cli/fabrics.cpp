@@ -20,7 +20,7 @@ constexpr const char* kHelp =
     "Example: weft fabrics";
 
 struct FabricsOptions {
-  security::Endpoint coordinator;
+  std::string coordinator;
   bool wants_json = false;
 };
 

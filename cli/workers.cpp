@@ -22,7 +22,7 @@ constexpr const char* kHelp =
     "Example: weft workers --json";
 
 struct WorkersOptions {
-  security::Endpoint coordinator;
+  std::string coordinator;
   bool wants_json = false;
 };
 

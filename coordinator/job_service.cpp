@@ -31,8 +31,8 @@ class Counted {
 
 grpc::Status JobService::Submit(grpc::ServerContext* context, const v1::SubmitRequest* request,
                                 v1::SubmitResponse* response) {
-  return answer(*context, "JobService.Submit", [&] {
-    *response->mutable_job() = scheduler_.submit(*request);
+  return answer(*context, "JobService.Submit", [&](const security::Caller& caller) {
+    *response->mutable_job() = scheduler_.submit(*request, caller);
     return grpc::Status::OK;
   });
 }
@@ -96,9 +96,57 @@ grpc::Status JobService::send_changes(const grpc::ServerContext& context, const 
 grpc::Status JobService::CancelJob(grpc::ServerContext* context,
                                    const v1::CancelJobRequest* request,
                                    v1::CancelJobResponse* response) {
-  return answer(*context, "JobService.CancelJob", [&] {
-    check_id(request->request_id(), "request_id");
-    *response->mutable_job() = scheduler_.cancel(request->job_id());
+  return answer(*context, "JobService.CancelJob", [&](const security::Caller& caller) {
+    *response->mutable_job() =
+        scheduler_.cancel({request->request_id(), request->job_id(), caller});
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::PauseJob(grpc::ServerContext* context, const v1::PauseJobRequest* request,
+                                  v1::PauseJobResponse* response) {
+  return answer(*context, "JobService.PauseJob", [&](const security::Caller& caller) {
+    *response->mutable_job() =
+        scheduler_.pause({request->request_id(), request->job_id(), caller}, true);
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::ResumeJob(grpc::ServerContext* context,
+                                   const v1::ResumeJobRequest* request,
+                                   v1::ResumeJobResponse* response) {
+  return answer(*context, "JobService.ResumeJob", [&](const security::Caller& caller) {
+    *response->mutable_job() =
+        scheduler_.pause({request->request_id(), request->job_id(), caller}, false);
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::RetryJob(grpc::ServerContext* context, const v1::RetryJobRequest* request,
+                                  v1::RetryJobResponse* response) {
+  return answer(*context, "JobService.RetryJob", [&](const security::Caller& caller) {
+    *response->mutable_job() = scheduler_.retry({request->request_id(), request->job_id(), caller});
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::SetPriority(grpc::ServerContext* context,
+                                     const v1::SetPriorityRequest* request,
+                                     v1::SetPriorityResponse* response) {
+  return answer(*context, "JobService.SetPriority", [&](const security::Caller& caller) {
+    *response->mutable_job() = scheduler_.set_priority(
+        {request->request_id(), request->job_id(), caller}, request->priority());
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::ListAttempts(grpc::ServerContext* context,
+                                      const v1::ListAttemptsRequest* request,
+                                      v1::ListAttemptsResponse* response) {
+  return answer(*context, "JobService.ListAttempts", [&] {
+    for (v1::AttemptInfo& attempt : scheduler_.attempts(*request)) {
+      response->add_attempts()->Swap(&attempt);
+    }
     return grpc::Status::OK;
   });
 }

@@ -23,6 +23,16 @@ class JobService final : public v1::JobService::Service {
                         grpc::ServerWriter<v1::WatchJobResponse>* writer) override;
   grpc::Status CancelJob(grpc::ServerContext* context, const v1::CancelJobRequest* request,
                          v1::CancelJobResponse* response) override;
+  grpc::Status PauseJob(grpc::ServerContext* context, const v1::PauseJobRequest* request,
+                        v1::PauseJobResponse* response) override;
+  grpc::Status ResumeJob(grpc::ServerContext* context, const v1::ResumeJobRequest* request,
+                         v1::ResumeJobResponse* response) override;
+  grpc::Status RetryJob(grpc::ServerContext* context, const v1::RetryJobRequest* request,
+                        v1::RetryJobResponse* response) override;
+  grpc::Status SetPriority(grpc::ServerContext* context, const v1::SetPriorityRequest* request,
+                           v1::SetPriorityResponse* response) override;
+  grpc::Status ListAttempts(grpc::ServerContext* context, const v1::ListAttemptsRequest* request,
+                            v1::ListAttemptsResponse* response) override;
 
  private:
   // Sends the job whenever its revision is another, until it has ended or the caller is gone.

@@ -1,171 +1,62 @@
 #include "coordinator/journal.h"
 
-#include <condition_variable>
-#include <map>
-#include <mutex>
-#include <thread>
+#include <algorithm>
 
-#include "coordinator/sqlite.h"
-#include "core/error.h"
+#include "coordinator/journal_schema.h"
+#include "coordinator/journal_state.h"
 
 namespace weft::coordinator {
 
 namespace {
 
-constexpr std::int64_t kSchema = 1;
+// What the write-ahead log is cut back to whenever it has been copied into the file.
+constexpr const char* kPragmas =
+    "PRAGMA locking_mode=EXCLUSIVE; PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; "
+    "PRAGMA journal_size_limit=67108864; PRAGMA cache_size=-65536;";
 
-constexpr const char* kTables = R"sql(
-CREATE TABLE IF NOT EXISTS meta(key TEXT PRIMARY KEY, value INTEGER NOT NULL) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS jobs(
-  position INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE,
-  request_id TEXT NOT NULL UNIQUE, fabric TEXT NOT NULL, description BLOB NOT NULL,
-  comment TEXT NOT NULL, fingerprint BLOB, submitted_at_ms INTEGER NOT NULL,
-  ended_at_ms INTEGER NOT NULL, summary BLOB NOT NULL);
-CREATE TABLE IF NOT EXISTS results(
-  shard BLOB PRIMARY KEY, result BLOB NOT NULL, size_bytes INTEGER NOT NULL) WITHOUT ROWID;
-CREATE INDEX IF NOT EXISTS results_by_result ON results(result);
-CREATE TABLE IF NOT EXISTS failures(
-  job TEXT NOT NULL, stage INTEGER NOT NULL, shard INTEGER NOT NULL, worker TEXT NOT NULL,
-  message TEXT NOT NULL);
-CREATE INDEX IF NOT EXISTS failures_by_job ON failures(job, stage);
-)sql";
-
-void write(Connection& c, const JobRecord& job) {
-  Statement s(c,
-              "INSERT INTO jobs(id, request_id, fabric, description, comment, fingerprint, "
-              "submitted_at_ms, ended_at_ms, summary) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  s.text(job.id).text(job.request_id).text(job.fabric).blob(job.description).text(job.comment);
-  if (job.fingerprint) {
-    s.blob(job.fingerprint->binary());
-  } else {
-    s.null();
-  }
-  s.number(static_cast<std::uint64_t>(job.submitted_at_ms))
-      .number(static_cast<std::uint64_t>(job.ended_at_ms))
-      .blob(job.summary)
-      .step();
-}
-
-void write(Connection& c, const JobEndRecord& end) {
-  Statement(c, "UPDATE jobs SET ended_at_ms = ?, summary = ? WHERE id = ?")
-      .number(static_cast<std::uint64_t>(end.ended_at_ms))
-      .blob(end.summary)
-      .text(end.job)
-      .step();
-}
-
-void write(Connection& c, const BindRecord& bind) {
-  Statement(c, "UPDATE jobs SET fingerprint = ? WHERE id = ?")
-      .blob(bind.fingerprint.binary())
-      .text(bind.job)
-      .step();
-}
-
-void write(Connection& c, const ResultRecord& result) {
-  Statement(c, "INSERT OR REPLACE INTO results(shard, result, size_bytes) VALUES(?, ?, ?)")
-      .blob(result.shard.binary())
-      .blob(result.result.binary())
-      .number(result.size_bytes)
-      .step();
-}
-
-void write(Connection& c, const FailureRecord& failure) {
-  Statement(c, "INSERT INTO failures(job, stage, shard, worker, message) VALUES(?, ?, ?, ?, ?)")
-      .text(failure.job)
-      .number(static_cast<std::uint64_t>(failure.stage))
-      .number(failure.shard)
-      .text(failure.worker)
-      .text(failure.message)
-      .step();
-}
-
-constexpr const char* kJobColumns =
-    "id, request_id, fabric, description, comment, fingerprint, submitted_at_ms, ended_at_ms, "
-    "summary";
-
-JobRecord job_of(const Statement& s) {
-  JobRecord job;
-  job.id = s.bytes_of(0);
-  job.request_id = s.bytes_of(1);
-  job.fabric = s.bytes_of(2);
-  job.description = s.bytes_of(3);
-  job.comment = s.bytes_of(4);
-  if (!s.bytes_of(5).empty()) {
-    job.fingerprint = s.digest_of(5);
-  }
-  job.submitted_at_ms = s.signed_of(6);
-  job.ended_at_ms = s.signed_of(7);
-  job.summary = s.bytes_of(8);
-  return job;
+std::uint64_t used_bytes(Connection& connection) {
+  Statement s(connection,
+              "SELECT (page_count - freelist_count) * page_size FROM pragma_page_count(), "
+              "pragma_freelist_count(), pragma_page_size()");
+  return s.step() ? s.number_of(0) : 0;
 }
 
 }  // namespace
 
-struct Journal::State {
-  explicit State(const std::filesystem::path& file) : connection(file) {}
-
-  void open();
-  void commit_loop();
-  void write_all(const std::vector<Record>& records);
-
-  std::mutex connection_mutex;  // locked before `mutex` where both are
-  Connection connection;
-  JournalCatalogue catalogue{connection, connection_mutex};
-  std::uint32_t epoch = 0;
-
-  std::mutex mutex;  // of everything below
-  std::condition_variable changed;
-  std::vector<Record> waiting;
-  // Results that are appended and not yet in the file; lookups see them.
-  std::map<core::Digest, core::Digest> unwritten;
-  Ticket appended = 0;
-  Ticket durable = 0;
-  std::string failure;
-  bool stopping = false;
-  std::thread committer;
-};
-
 void Journal::State::open() {
-  connection.run(
-      "PRAGMA locking_mode=EXCLUSIVE; PRAGMA journal_mode=WAL; "
-      "PRAGMA synchronous=FULL; BEGIN EXCLUSIVE;");
-  connection.run(kTables);
-  JournalCatalogue::create_tables(connection);
-  Statement schema(connection, "SELECT value FROM meta WHERE key = 'schema'");
-  if (schema.step() && schema.signed_of(0) != kSchema) {
-    throw core::Error(core::Code::kFailedPrecondition,
-                      "the journal has schema " + std::to_string(schema.signed_of(0)) +
-                          ", this program knows schema " + std::to_string(kSchema) +
-                          "; use the program that wrote it, or another state folder");
-  }
-  schema.reset();
-  Statement(connection, "INSERT OR IGNORE INTO meta VALUES('schema', ?), ('epoch', 0)")
-      .number(kSchema)
-      .step();
+  connection.run(kPragmas);
+  connection.run("BEGIN EXCLUSIVE");
+  make_schema(connection);
   connection.run("UPDATE meta SET value = value + 1 WHERE key = 'epoch'");
-  Statement counted(connection, "SELECT value FROM meta WHERE key = 'epoch'");
-  counted.step();
-  epoch = static_cast<std::uint32_t>(counted.number_of(0));
-  counted.reset();
+  {
+    Statement counted(connection, "SELECT value FROM meta WHERE key = 'epoch'");
+    counted.step();
+    epoch = static_cast<std::uint32_t>(counted.number_of(0));
+  }
   connection.run("COMMIT");
+  writer.emplace(connection);
+  size_bytes = used_bytes(connection);
 }
 
 void Journal::State::write_all(const std::vector<Record>& records) {
-  const std::lock_guard lock(connection_mutex);
+  const std::lock_guard connection_lock(connection_mutex);
   connection.run("BEGIN IMMEDIATE");
   for (const Record& record : records) {
-    std::visit([&](const auto& r) { write(connection, r); }, record);
+    writer->write(record);
   }
   connection.run("COMMIT");
+  const std::uint64_t used = used_bytes(connection);
+  const std::lock_guard lock(mutex);
+  size_bytes = used;
 }
 
 // Group commit: while one transaction is being synced, the next one's records gather.
 void Journal::State::commit_loop() {
   std::unique_lock lock(mutex);
-  for (;;) {
-    changed.wait(lock, [&] { return stopping || !waiting.empty(); });
+  while (failure.empty()) {
+    appended_more.wait(lock, [&] { return stopping || !waiting.empty(); });
     if (waiting.empty()) {
-      return;
+      break;
     }
     const std::vector<Record> records = std::move(waiting);
     waiting.clear();
@@ -174,29 +65,56 @@ void Journal::State::commit_loop() {
     std::string problem;
     try {
       write_all(records);
-    } catch (const core::Error& error) {
+    } catch (const std::exception& error) {
       problem = error.what();
     }
     lock.lock();
-    if (!problem.empty()) {
+    if (problem.empty()) {
+      durable = ticket;
+    } else {
       failure = problem;
-      changed.notify_all();
+    }
+    committed.notify_all();
+  }
+  has_committed_all = true;
+  committed.notify_all();
+}
+
+// Answers in a thread of its own, so that the next commit need not wait for it.
+void Journal::State::answer_loop() {
+  std::unique_lock lock(mutex);
+  for (;;) {
+    committed.wait(lock, [&] {
+      return has_committed_all || (!unanswered.empty() && is_over(unanswered.front().first));
+    });
+    std::vector<std::pair<Done, std::optional<core::Error>>> answers;
+    while (!unanswered.empty() && (has_committed_all || is_over(unanswered.front().first))) {
+      answers.emplace_back(std::move(unanswered.front().second),
+                           problem_of(unanswered.front().first));
+      unanswered.pop_front();
+    }
+    if (answers.empty() && has_committed_all) {
       return;
     }
-    durable = ticket;
-    for (const Record& record : records) {
-      const auto* const result = std::get_if<ResultRecord>(&record);
-      if (result != nullptr) {
-        unwritten.erase(result->shard);
-      }
+    lock.unlock();
+    for (const auto& [done, problem] : answers) {
+      done(problem);
     }
-    changed.notify_all();
+    lock.lock();
   }
+}
+
+std::optional<core::Error> Journal::State::problem_of(Ticket ticket) const {
+  if (durable >= ticket) {
+    return std::nullopt;
+  }
+  return core::Error(core::Code::kUnavailable, failure.empty() ? "the journal closes" : failure);
 }
 
 Journal::Journal(const std::filesystem::path& file) : state_(std::make_unique<State>(file)) {
   state_->open();
   state_->committer = std::thread([this] { state_->commit_loop(); });
+  state_->answerer = std::thread([this] { state_->answer_loop(); });
 }
 
 Journal::~Journal() {
@@ -204,8 +122,9 @@ Journal::~Journal() {
     const std::lock_guard lock(state_->mutex);
     state_->stopping = true;
   }
-  state_->changed.notify_all();
+  state_->appended_more.notify_all();
   state_->committer.join();
+  state_->answerer.join();
 }
 
 std::uint32_t Journal::epoch() const { return state_->epoch; }
@@ -218,94 +137,40 @@ Journal::Ticket Journal::append(std::vector<Record> records) {
   if (records.empty()) {
     return state_->appended;  // what the caller knows may rest on records that are not durable yet
   }
-  for (Record& record : records) {
-    const auto* const result = std::get_if<ResultRecord>(&record);
-    if (result != nullptr) {
-      state_->unwritten[result->shard] = result->result;
-    }
-    state_->waiting.push_back(std::move(record));
-  }
-  state_->changed.notify_all();
+  state_->waiting.insert(state_->waiting.end(), std::make_move_iterator(records.begin()),
+                         std::make_move_iterator(records.end()));
+  state_->appended_more.notify_one();
   return ++state_->appended;
 }
 
 void Journal::wait(Ticket ticket) {
   std::unique_lock lock(state_->mutex);
-  state_->changed.wait(lock, [&] { return state_->durable >= ticket || !state_->failure.empty(); });
-  if (state_->durable < ticket) {
-    throw core::Error(core::Code::kUnavailable, state_->failure);
+  state_->committed.wait(lock, [&] { return state_->is_over(ticket); });
+  if (const std::optional<core::Error> problem = state_->problem_of(ticket)) {
+    throw core::Error(*problem);
   }
 }
 
-std::vector<JobRecord> Journal::jobs(std::size_t ended_limit) {
-  const std::lock_guard lock(state_->connection_mutex);
-  std::vector<JobRecord> jobs;
-  const std::string columns = kJobColumns;
-  Statement unfinished(
-      state_->connection,
-      ("SELECT " + columns + " FROM jobs WHERE ended_at_ms = 0 ORDER BY position").c_str());
-  while (unfinished.step()) {
-    jobs.push_back(job_of(unfinished));
+void Journal::when_durable(Ticket ticket, Done done) {
+  std::optional<core::Error> problem;
+  {
+    const std::lock_guard lock(state_->mutex);
+    if (!state_->is_over(ticket)) {
+      auto& unanswered = state_->unanswered;
+      const auto place =
+          std::upper_bound(unanswered.begin(), unanswered.end(), ticket,
+                           [](Ticket t, const auto& entry) { return t < entry.first; });
+      unanswered.emplace(place, ticket, std::move(done));
+      return;
+    }
+    problem = state_->problem_of(ticket);
   }
-  Statement ended(
-      state_->connection,
-      ("SELECT " + columns + " FROM jobs WHERE ended_at_ms <> 0 ORDER BY position DESC LIMIT ?")
-          .c_str());
-  ended.number(ended_limit);
-  while (ended.step()) {
-    jobs.push_back(job_of(ended));
-  }
-  return jobs;
+  done(problem);
 }
 
-std::optional<JobRecord> Journal::job_of_request(const std::string& request_id) {
-  wait(append({}));
-  const std::lock_guard lock(state_->connection_mutex);
-  Statement s(state_->connection,
-              ("SELECT " + std::string(kJobColumns) + " FROM jobs WHERE request_id = ?").c_str());
-  return s.text(request_id).step() ? std::optional(job_of(s)) : std::nullopt;
-}
-
-std::vector<std::optional<core::Digest>> Journal::results_of(std::span<const core::Digest> shards) {
-  std::vector<std::optional<core::Digest>> results(shards.size());
-  // Both locks: what is no longer unwritten is in the file.
-  const std::lock_guard connection_lock(state_->connection_mutex);
+std::uint64_t Journal::size_bytes() const {
   const std::lock_guard lock(state_->mutex);
-  Statement s(state_->connection, "SELECT result FROM results WHERE shard = ?");
-  for (std::size_t i = 0; i < shards.size(); ++i) {
-    const auto unwritten = state_->unwritten.find(shards[i]);
-    if (unwritten != state_->unwritten.end()) {
-      results[i] = unwritten->second;
-      continue;
-    }
-    if (s.blob(shards[i].binary()).step()) {
-      results[i] = s.digest_of(0);
-    }
-    s.reset();
-  }
-  return results;
-}
-
-std::uint64_t Journal::forget_result(const core::Digest& result) {
-  wait(append({}));
-  const std::lock_guard lock(state_->connection_mutex);
-  Statement(state_->connection, "DELETE FROM results WHERE result = ?")
-      .blob(result.binary())
-      .step();
-  return state_->connection.changed_rows();
-}
-
-std::vector<FailureRecord> Journal::failures_of(const std::string& job, StageName stage) {
-  const std::lock_guard lock(state_->connection_mutex);
-  Statement s(state_->connection,
-              "SELECT shard, worker, message FROM failures WHERE job = ? AND stage = ?");
-  s.text(job).number(static_cast<std::uint64_t>(stage));
-  std::vector<FailureRecord> failures;
-  while (s.step()) {
-    failures.push_back(
-        {job, stage, s.number_of(0), s.bytes_of(1), s.bytes_of(2), TroubleKind::kFailed});
-  }
-  return failures;
+  return state_->size_bytes;
 }
 
 JournalCatalogue& Journal::catalogue() { return state_->catalogue; }

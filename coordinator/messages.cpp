@@ -1,6 +1,7 @@
 #include "coordinator/messages.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "core/error.h"
 #include "proto/limits.h"
@@ -8,6 +9,9 @@
 namespace weft::coordinator {
 
 namespace {
+
+constexpr const char* kNobody = "nobody";  // who calls without a certificate
+constexpr std::int32_t kPriorityLimit = 100;
 
 [[noreturn]] void refuse(const std::string& what) {
   throw core::Error(core::Code::kInvalidArgument, what);
@@ -19,6 +23,20 @@ void check_count(std::uint64_t count, std::uint64_t limit, const char* field) {
            std::to_string(limit) + " are allowed");
   }
 }
+
+bool is_word_of(const std::string& text, const char* further) {
+  return !text.empty() && text.size() <= v1::kIdLimit &&
+         std::all_of(text.begin(), text.end(), [&](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  std::strchr(further, c) != nullptr;
+         });
+}
+
+bool is_user_name(const std::string& name) {
+  return is_word_of(name, "_.@-") && is_word_of(name.substr(0, 1), "");
+}
+
+bool is_label(const std::string& label) { return is_word_of(label, "_.=-"); }
 
 CompletionClaim completion_from(const v1::Completion& completion) {
   CompletionClaim claim;
@@ -43,6 +61,12 @@ CompletionClaim completion_from(const v1::Completion& completion) {
 
 }  // namespace
 
+void check_priority(std::int32_t priority) {
+  if (priority < -kPriorityLimit || priority > kPriorityLimit) {
+    refuse("priority is " + std::to_string(priority) + "; it goes from -100 to 100");
+  }
+}
+
 std::int64_t to_ms(Time time) { return time.time_since_epoch().count(); }
 
 core::Digest digest_from(const std::string& bytes, const char* field) {
@@ -63,6 +87,37 @@ void check_id(const std::string& id, const char* field) {
   if (!is_good) {
     refuse(std::string(field) + " must be 1 to 64 characters of A-Z, a-z, 0-9, _ and -");
   }
+}
+
+JobDemands demands_from(const v1::SubmitOptions& options, const security::Caller& caller) {
+  check_count(options.comment().size(), v1::kCommentLimitBytes, "the length of options.comment");
+  check_count(static_cast<std::uint64_t>(options.labels_size()), v1::kLabelsLimit,
+              "options.labels");
+  const std::string self = caller.user.empty() ? kNobody : caller.user;
+  JobDemands demands;
+  demands.user = options.user().empty() ? self : options.user();
+  demands.priority = options.priority();
+  demands.audit = options.audit();
+  demands.labels.assign(options.labels().begin(), options.labels().end());
+  if (!is_user_name(demands.user)) {
+    refuse(
+        "options.user must be 1 to 64 characters of A-Z, a-z, 0-9, _, ., @ and -, and begin "
+        "with a letter or a digit");
+  }
+  if (demands.user != self && !caller.may(v1::ROLE_ADMIN)) {
+    throw core::Error(core::Code::kPermissionDenied,
+                      "only an admin may submit for another user; leave options.user empty");
+  }
+  check_priority(demands.priority);
+  if (!(demands.audit >= 0 && demands.audit <= 1)) {
+    refuse("options.audit is a share: from 0 to 1");
+  }
+  for (const std::string& label : demands.labels) {
+    if (!is_label(label)) {
+      refuse("a label must be 1 to 64 characters of A-Z, a-z, 0-9, _, ., = and -");
+    }
+  }
+  return demands;
 }
 
 ReportEvent report_from(const v1::SynchronizeRequest& request) {

@@ -138,6 +138,25 @@ v1::Job message_of(const Queue& queue, const JobState& job, Time now) {
   return message;
 }
 
+v1::AttemptInfo message_of(const KeptAttempt& attempt) {
+  v1::AttemptInfo message;
+  message.mutable_name()->set_job_id(attempt.begin.job);
+  message.mutable_name()->set_attempt(attempt.begin.attempt);
+  message.set_stage(to_string(attempt.begin.stage));
+  message.set_first_shard(attempt.begin.first_shard);
+  message.set_shards(attempt.begin.shards);
+  message.set_worker(attempt.begin.worker_name);
+  message.set_purpose(to_string(attempt.begin.purpose));
+  message.set_began_at_ms(attempt.begin.began_at_ms);
+  message.set_outcome(attempt.end ? to_string(attempt.end->outcome) : "running");
+  if (attempt.end) {
+    message.set_message(attempt.end->message);
+    message.set_ended_at_ms(attempt.end->ended_at_ms);
+    message.set_shards_done(attempt.end->shards_done);
+  }
+  return message;
+}
+
 v1::Worker message_of(const Queue& queue, const WorkerState& worker, Time now) {
   v1::Worker message;
   message.set_id(worker.id);

@@ -69,6 +69,18 @@ std::uint32_t shadow_paths(v1::Quality quality) {
   }
 }
 
+// What a tile's arrays, the scene of its strands and the hierarchy over them take for a segment,
+// rounded up to a power of two; the base is for the program and the results.
+constexpr std::uint64_t kSceneBytesPerSegment = 512;
+constexpr std::uint64_t kBaseMemoryBytes = std::uint64_t{64} << 20;
+
+std::uint64_t scene_memory(const fabric::Tile& tile) {
+  return kBaseMemoryBytes + tile.segment_count() * kSceneBytesPerSegment;
+}
+
+// Of the map of directions, in floats.
+std::uint64_t map_bytes(std::uint64_t resolution) { return resolution * resolution * 4; }
+
 std::uint64_t ceil_div(std::uint64_t count, std::uint64_t divisor) {
   return (count + divisor - 1) / divisor;
 }
@@ -130,6 +142,7 @@ Stage visibility_stage(const v1::FabricDescription& description, const core::Dig
                            ceil_div(tile.segment_count(), kSegmentsPerShard), {tile_digest});
   stage.spec.mutable_visibility()->set_resolution(
       expanded(description.precompute().visibility_resolution(), "visibility_resolution"));
+  stage.memory_bytes = scene_memory(tile);
   return stage;
 }
 
@@ -143,6 +156,9 @@ Stage basis_stage(const v1::FabricDescription& description, const StageResults& 
   for (const std::uint64_t shard : basis_sample(description, visibility.shards.size())) {
     stage.inputs.push_back(visibility.shards[shard]);
   }
+  // The distances of the sampled segments, and a copy that is worked on.
+  stage.memory_bytes =
+      kBaseMemoryBytes + 2 * stage.inputs.size() * kSegmentsPerShard * map_bytes(spec.resolution());
   return stage;
 }
 
@@ -211,6 +227,7 @@ Stage transfer_stage(const v1::FabricDescription& description,
     throw core::Error(core::Code::kDataLoss, "the grid's cell_coordinates are not [cells, 3]");
   }
   stage.shard_count = shape[0] * ceil_div(spec.paths_per_cell(), spec.paths_per_shard());
+  stage.memory_bytes = scene_memory(tile);
   return stage;
 }
 
@@ -229,25 +246,53 @@ Stage shadow_stage(const v1::FabricDescription& description,
   spec.set_bins(kShadowBins);
   spec.set_bin_mfp(kShadowBinMfp);
   stage.shard_count = ceil_div(spec.paths(), spec.paths_per_shard());
+  stage.memory_bytes = scene_memory(tile);
   return stage;
 }
 
-// Paths are numbered within their cell, so a shard is named by its cell and its paths: raising
-// paths_per_cell leaves the digests of all full blocks as they are.
-void name_transfer_shard(core::Hasher& hasher, const Stage& stage, std::uint64_t shard) {
-  v1::TransferSpec spec = stage.spec.transfer();
+// The part of a stage's spec that all its shards are named by. Paths are numbered within their
+// cell, so a shard of transfer is named by its cell and its paths: raising paths_per_cell leaves
+// the digests of all full blocks as they are.
+std::string naming_spec(const Stage& stage) {
+  v1::TaskSpec named = stage.spec;
+  if (named.has_transfer()) {
+    named.mutable_transfer()->clear_paths_per_cell();
+    named.mutable_transfer()->clear_paths_per_shard();
+  }
+  return v1::canonical_bytes(named);
+}
+
+void name_transfer_shard(core::Hasher& hasher, const v1::TransferSpec& spec, std::uint64_t shard) {
   const std::uint64_t blocks = ceil_div(spec.paths_per_cell(), spec.paths_per_shard());
   const std::uint64_t first_path = shard % blocks * spec.paths_per_shard();
   const std::uint64_t paths =
       std::min<std::uint64_t>(spec.paths_per_shard(), spec.paths_per_cell() - first_path);
-  spec.clear_paths_per_cell();
-  spec.clear_paths_per_shard();
-  v1::TaskSpec named;
-  *named.mutable_transfer() = spec;
-  hasher.field(v1::canonical_bytes(named));
   hasher.number(shard / blocks);
   hasher.number(first_path);
   hasher.number(paths);
+}
+
+core::Digest name_shard(const Stage& stage, const std::string& spec, std::uint64_t shard,
+                        const core::Digest& fingerprint) {
+  core::Hasher hasher;
+  hasher.field("weft.shard");
+  hasher.number(kResultsRevision);
+  hasher.bytes(fingerprint.binary());
+  hasher.number(stage.inputs.size());
+  for (const core::Digest& input : stage.inputs) {
+    hasher.bytes(input.binary());
+  }
+  hasher.field(spec);
+  if (stage.spec.has_transfer()) {
+    name_transfer_shard(hasher, stage.spec.transfer(), shard);
+    return hasher.finish();
+  }
+  hasher.number(stage.shard_count);
+  hasher.number(shard);
+  if (!stage.shard_inputs.empty()) {
+    hasher.bytes(stage.shard_inputs[shard].binary());
+  }
+  return hasher.finish();
 }
 
 }  // namespace
@@ -303,25 +348,17 @@ std::uint64_t rotation_seed(const v1::FabricDescription& description) {
 core::Digest shard_digest(const Stage& stage, std::uint64_t shard,
                           const core::Digest& fingerprint) {
   CHECK_LT(shard, stage.shard_count);
-  core::Hasher hasher;
-  hasher.field("weft.shard");
-  hasher.number(kResultsRevision);
-  hasher.bytes(fingerprint.binary());
-  hasher.number(stage.inputs.size());
-  for (const core::Digest& input : stage.inputs) {
-    hasher.bytes(input.binary());
+  return name_shard(stage, naming_spec(stage), shard, fingerprint);
+}
+
+std::vector<core::Digest> shard_digests(const Stage& stage, const core::Digest& fingerprint) {
+  const std::string spec = naming_spec(stage);
+  std::vector<core::Digest> digests;
+  digests.reserve(stage.shard_count);
+  for (std::uint64_t shard = 0; shard < stage.shard_count; ++shard) {
+    digests.push_back(name_shard(stage, spec, shard, fingerprint));
   }
-  if (stage.spec.has_transfer()) {
-    name_transfer_shard(hasher, stage, shard);
-    return hasher.finish();
-  }
-  hasher.field(v1::canonical_bytes(stage.spec));
-  hasher.number(stage.shard_count);
-  hasher.number(shard);
-  if (!stage.shard_inputs.empty()) {
-    hasher.bytes(stage.shard_inputs[shard].binary());
-  }
-  return hasher.finish();
+  return digests;
 }
 
 std::vector<Stage> plan(const v1::FabricDescription& description,

@@ -22,6 +22,9 @@ struct Stage {
   std::uint64_t shard_count = 0;
   std::vector<core::Digest> inputs;        // result blobs that every shard reads
   std::vector<core::Digest> shard_inputs;  // empty, or one result blob per shard
+  // What a worker is expected to need for a run, coarsely: 64 MiB, and what the stage's tables and
+  // the Embree scene of its tile take. 0: not known.
+  std::uint64_t memory_bytes = 0;
 };
 
 // Names the work of one shard; equal digests mean equal results. Covers the numerics fingerprint,
@@ -29,6 +32,10 @@ struct Stage {
 // paths, so that a raised paths_per_cell keeps the full blocks that are there.
 [[nodiscard]] core::Digest shard_digest(const Stage& stage, std::uint64_t shard,
                                         const core::Digest& fingerprint);
+
+// Of all shards, by index.
+[[nodiscard]] std::vector<core::Digest> shard_digests(const Stage& stage,
+                                                      const core::Digest& fingerprint);
 
 // Results of finished stages: for each, its shards' result blobs in index order.
 struct StageResults {

@@ -16,22 +16,19 @@ namespace weft::coordinator {
 
 namespace {
 
-constexpr auto kTick = std::chrono::seconds(1);
-
-v1::FabricDescription parse_description(const std::string& bytes, const std::string& job) {
-  v1::FabricDescription description;
-  if (!description.ParseFromString(bytes)) {
-    throw core::Error(core::Code::kDataLoss,
-                      "the journal's description of job " + job + " is damaged");
-  }
-  return description;
-}
-
+// What is left of a job whose record is damaged, so that it keeps nothing else from starting.
 v1::Job parse_summary(const JobRecord& record) {
   v1::Job job;
-  if (!job.ParseFromString(record.summary)) {
-    throw core::Error(core::Code::kDataLoss, "the journal's record of job " + record.id +
-                                                 " is damaged; restore the state folder");
+  if (!job.ParseFromString(record.summary) || job.id() != record.id) {
+    spdlog::error("job={} event=damaged_record", record.id);
+    job.Clear();
+    job.set_id(record.id);
+    job.set_fabric(record.fabric);
+    job.set_state(v1::JOB_STATE_FAILED);
+    job.set_error("the journal's record of how this job ended is damaged");
+    job.set_user(record.demands.user);
+    job.set_submitted_at_ms(record.submitted_at_ms);
+    job.set_ended_at_ms(record.ended_at_ms);
   }
   return job;
 }
@@ -39,11 +36,6 @@ v1::Job parse_summary(const JobRecord& record) {
 // Six bytes of a digest: the same request gives the same job.
 std::string job_id_of(const std::string& request_id) {
   return "j" + core::digest_of(request_id).hex().substr(0, 12);
-}
-
-bool is_over(const v1::Job& job) {
-  return job.state() == v1::JOB_STATE_SUCCEEDED || job.state() == v1::JOB_STATE_FAILED ||
-         job.state() == v1::JOB_STATE_CANCELLED;
 }
 
 }  // namespace
@@ -62,20 +54,22 @@ Scheduler::Scheduler(SchedulerOptions options, const core::Clock& clock)
   load();
   planner_ = std::thread([this] { work_through(to_plan_); });
   committer_ = std::thread([this] { work_through(to_commit_); });
-  ticker_ = std::thread([this] { tick(); });
+  dispatcher_ = std::thread([this] { dispatch(); });
 }
 
 Scheduler::~Scheduler() {
   stop();
   planner_.join();
   committer_.join();
-  ticker_.join();
+  dispatcher_.join();
 }
 
 void Scheduler::stop() {
   const std::lock_guard lock(mutex_);
   stopping_ = true;
-  changed_.notify_all();
+  tasks_changed_.notify_all();
+  jobs_changed_.notify_all();
+  dispatch_needed_.notify_all();
 }
 
 std::optional<std::string> Scheduler::fatal_problem() {
@@ -94,19 +88,18 @@ void Scheduler::check_running() const {
 
 void Scheduler::load() {
   const std::lock_guard lock(mutex_);
-  std::vector<JobRecord> jobs = journal_.jobs(kEndedJobsLimit);
-  for (const JobRecord& record : jobs) {
+  for (const std::string& name : journal_.drained()) {
+    apply(DrainEvent{name, true}, nullptr);
+  }
+  for (const BlockRecord& block : journal_.blocks()) {
+    apply(BlockEvent{block.worker, block.stage, true, block.is_liar}, nullptr);
+  }
+  for (const std::string& id : journal_.orders()) {
+    orders_.add(id);
+  }
+  for (const JobRecord& record : journal_.jobs(kEndedJobsLimit)) {
     if (record.ended_at_ms == 0) {
-      JobFile& file = files_[record.id];
-      file.description = parse_description(record.description, record.id);
-      file.comment = record.comment;
-      apply(SubmitEvent{record.id,
-                        record.fabric,
-                        record.fingerprint,
-                        Time(std::chrono::milliseconds(record.submitted_at_ms)),
-                        {},
-                        false},
-            nullptr);
+      load(record);
       continue;
     }
     ended_[record.id] = parse_summary(record);
@@ -116,10 +109,72 @@ void Scheduler::load() {
                files_.size(), ended_.size());
 }
 
-// Applies an event and sees to what follows from it. The ticket is of all that it needs to be
-// durable.
-Journal::Ticket Scheduler::apply(const Event& event, Reply* reply) {
+// Takes an unfinished job of the journal into the queue. One whose description cannot be read ends,
+// so that it keeps nothing else from starting.
+void Scheduler::load(const JobRecord& record) {
+  JobFile& file = files_[record.id];
+  file.comment = record.comment;
+  file.user = record.demands.user;
+  ++unfinished_of_user_[file.user];
+  const bool is_readable = file.description.ParseFromString(record.description);
+  const Time submitted_at(std::chrono::milliseconds(record.submitted_at_ms));
+  apply(SubmitEvent{record.id, record.fabric, record.fingerprint, submitted_at, record.demands,
+                    record.is_paused},
+        nullptr);
+  if (!is_readable) {
+    apply(JobFailedEvent{record.id, 0,
+                         "the journal's description of this job is damaged; submit it again"},
+          nullptr);
+  }
+}
+
+// Applies an event and sees to what follows from it. `records` come before what the event itself
+// asks to be kept. The ticket is of all that it needs to be durable.
+Journal::Ticket Scheduler::apply(const Event& event, Reply* reply, std::vector<Record> records) {
   Actions actions = queue_.apply(event, clock_.now());
+  log(actions);
+  std::vector<Record> of_event = records_of(actions);
+  records.insert(records.end(), std::make_move_iterator(of_event.begin()),
+                 std::make_move_iterator(of_event.end()));
+  if (recent_.is_kept) {
+    for (const ResultDropRecord& drop : actions.results_dropped) {
+      recent_.by_shard[drop.shard] = std::nullopt;
+    }
+    for (const ResultRecord& result : actions.results) {
+      recent_.by_shard[result.shard] = KeptResult{result.result, result.worker, false};
+    }
+  }
+  for (const AttemptEndRecord& end : actions.attempts_ended) {
+    waiting_.attempt_ended(end.attempt);
+  }
+  for (const std::string& id : actions.ended) {
+    end_job(id, records);
+  }
+  for (PlanAction& plan : actions.plan) {
+    to_plan_.push_back({std::move(plan)});
+  }
+  for (CommitAction& commit : actions.commit) {
+    to_commit_.push_back({std::move(commit)});
+  }
+  if (!actions.plan.empty() || !actions.commit.empty()) {
+    tasks_changed_.notify_all();
+  }
+  is_wake_pending_ = is_wake_pending_ || actions.wake;
+  if (is_wake_pending_ || waiting_.has_concerned()) {
+    dispatch_needed_.notify_one();
+  }
+  if (reply != nullptr) {
+    *reply = std::move(actions.reply);
+  }
+  try {
+    return journal_.append(std::move(records));
+  } catch (const core::Error& error) {
+    fatal_ = error.what();
+    throw;
+  }
+}
+
+void Scheduler::log(const Actions& actions) const {
   for (const BindRecord& bound : actions.bound) {
     spdlog::info("job={} event=bound fingerprint={}", bound.job,
                  bound.fingerprint.hex().substr(0, 12));
@@ -128,22 +183,20 @@ Journal::Ticket Scheduler::apply(const Event& event, Reply* reply) {
     spdlog::warn("job={} stage={} shard={} worker={} event=failed message=\"{}\"", failure.job,
                  to_string(failure.stage), failure.shard, failure.worker, failure.message);
   }
-  std::vector<Record> records = records_of(actions);
-  for (const std::string& id : actions.ended) {
-    end_job(id, records);
+  for (const BlockRecord& block : actions.blocks) {
+    spdlog::warn("worker={} stage={} event={} liar={}", block.worker, to_string(block.stage),
+                 block.is_blocked ? "blocked" : "unblocked", block.is_liar);
   }
-  to_plan_.insert(to_plan_.end(), actions.plan.begin(), actions.plan.end());
-  to_commit_.insert(to_commit_.end(), actions.commit.begin(), actions.commit.end());
-  wakes_ += actions.wake ? 1 : 0;
-  if (reply != nullptr) {
-    *reply = std::move(actions.reply);
+  for (const MismatchRecord& mismatch : actions.mismatches) {
+    spdlog::error("job={} stage={} shard={} event=results_differ worker={} other_worker={} liar={}",
+                  mismatch.job, to_string(mismatch.stage), mismatch.shard, mismatch.worker,
+                  mismatch.other_worker, mismatch.liar.empty() ? "unknown" : mismatch.liar);
   }
-  changed_.notify_all();
-  try {
-    return journal_.append(std::move(records));
-  } catch (const core::Error& error) {
-    fatal_ = error.what();
-    throw;
+  for (const AttemptEndRecord& end : actions.attempts_ended) {
+    if (end.outcome == Outcome::kLost || end.outcome == Outcome::kHung) {
+      spdlog::warn("job={} attempt={} event={} message=\"{}\"", end.job, end.attempt,
+                   to_string(end.outcome), end.message);
+    }
   }
 }
 
@@ -157,6 +210,10 @@ void Scheduler::end_job(const std::string& id, std::vector<Record>& records) {
   while (ended_order_.size() > kEndedJobsLimit) {
     ended_.erase(ended_order_.front());
     ended_order_.pop_front();
+  }
+  const auto user = unfinished_of_user_.find(files_.at(id).user);
+  if (--user->second == 0) {
+    unfinished_of_user_.erase(user);
   }
   files_.erase(id);
   queue_.forget_job(id);
@@ -172,6 +229,11 @@ v1::Job Scheduler::message(const std::string& id) const {
   v1::Job message = message_of(queue_, *job, clock_.now());
   const JobFile& file = files_.at(id);
   message.set_comment(file.comment);
+  message.set_user(file.user);
+  message.set_revision(file.first_revision + message.revision());
+  if (!file.problem.empty()) {
+    message.set_waiting_for(file.problem);
+  }
   if (file.version) {
     *message.mutable_version() = message_of(*file.version);
   }
@@ -220,11 +282,32 @@ std::optional<v1::Job> Scheduler::submitted_before(const JobRecord& record) {
   return is_in_memory ? message(record.id) : parse_summary(*before);
 }
 
-v1::Job Scheduler::submit(const v1::SubmitRequest& request) {
-  check_id(request.request_id(), "request_id");
-  if (request.options().comment().size() > v1::kCommentLimitBytes) {
-    throw core::Error(core::Code::kInvalidArgument, "options.comment is longer than 1024 bytes");
+// What may be refused though the description is right, each limit by its name.
+void Scheduler::check_limits(const std::string& user) const {
+  const auto refuse = [](const std::string& limit, const std::string& what) {
+    throw core::Error(core::Code::kResourceExhausted, limit + ": " + what);
+  };
+  if (files_.size() >= kUnfinishedJobsLimit) {
+    refuse("unfinished_jobs_limit", "there are " + std::to_string(files_.size()) +
+                                        " unfinished jobs, which is the limit; wait for some, or "
+                                        "cancel them");
   }
+  const auto jobs = unfinished_of_user_.find(user);
+  if (jobs != unfinished_of_user_.end() && jobs->second >= options_.queue.user_jobs_limit) {
+    refuse("user_jobs_limit", user + " has " + std::to_string(jobs->second) +
+                                  " unfinished jobs, which is the limit of one user; wait for "
+                                  "some, or cancel them");
+  }
+  const std::uint64_t size = journal_.size_bytes();
+  if (size >= options_.journal_limit_bytes) {
+    refuse("journal_limit_bytes", "the journal has grown to " + std::to_string(size) +
+                                      " bytes; remove results that no version needs (weft gc), or "
+                                      "raise the coordinator's limit");
+  }
+}
+
+v1::Job Scheduler::submit(const v1::SubmitRequest& request, const security::Caller& caller) {
+  check_id(request.request_id(), "request_id");
   fabric::check_description(request.description());
   JobRecord record;
   record.id = job_id_of(request.request_id());
@@ -232,6 +315,7 @@ v1::Job Scheduler::submit(const v1::SubmitRequest& request) {
   record.fabric = request.description().name();
   record.description = v1::canonical_bytes(request.description());
   record.comment = request.options().comment();
+  record.demands = demands_from(request.options(), caller);
 
   std::unique_lock lock(mutex_);
   check_running();
@@ -241,31 +325,20 @@ v1::Job Scheduler::submit(const v1::SubmitRequest& request) {
     journal_.wait(ticket);
     return *std::move(known);
   }
-  if (files_.size() >= kUnfinishedJobsLimit) {
-    throw core::Error(core::Code::kResourceExhausted,
-                      "there are " + std::to_string(files_.size()) +
-                          " unfinished jobs, which is the limit; wait for some, or cancel them");
-  }
+  check_limits(record.demands.user);
   const Time now = clock_.now();
   record.submitted_at_ms = to_ms(now);
-  files_[record.id].description = request.description();
-  files_[record.id].comment = record.comment;
-  const SubmitEvent event{record.id, record.fabric, std::nullopt, now, {}, false};
-  spdlog::info("job={} fabric={} event=submitted", record.id, record.fabric);
+  JobFile& file = files_[record.id];
+  file.description = request.description();
+  file.comment = record.comment;
+  file.user = record.demands.user;
+  ++unfinished_of_user_[file.user];
+  const SubmitEvent event{record.id, record.fabric, std::nullopt, now, record.demands, false};
+  spdlog::info("job={} fabric={} user={} event=submitted", record.id, record.fabric, file.user);
   const std::string id = record.id;
-  journal_.append({std::move(record)});
-  const Journal::Ticket ticket = apply(event, nullptr);
-  v1::Job job = message(id);
-  lock.unlock();
-  journal_.wait(ticket);
-  return job;
-}
-
-v1::Job Scheduler::cancel(const std::string& job_id) {
-  std::unique_lock lock(mutex_);
-  check_running();
-  const std::string id = full_id(job_id);
-  const Journal::Ticket ticket = apply(CancelEvent{id}, nullptr);
+  std::vector<Record> records;
+  records.emplace_back(std::move(record));
+  const Journal::Ticket ticket = apply(event, nullptr, std::move(records));
   v1::Job job = message(id);
   lock.unlock();
   journal_.wait(ticket);
@@ -295,43 +368,23 @@ std::vector<v1::Job> Scheduler::jobs(bool unfinished_only, std::size_t limit) {
   return jobs;
 }
 
-std::vector<v1::Worker> Scheduler::workers() {
-  const std::lock_guard lock(mutex_);
-  std::vector<v1::Worker> workers;
-  for (const auto& [id, worker] : queue_.workers()) {
-    workers.push_back(message_of(queue_, worker, clock_.now()));
-  }
-  std::stable_sort(workers.begin(), workers.end(),
-                   [](const v1::Worker& a, const v1::Worker& b) { return a.name() < b.name(); });
-  return workers;
-}
-
 v1::Job Scheduler::wait_for_change(const std::string& job_id, std::uint64_t seen,
                                    std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
   const std::string id = full_id(job_id);
-  v1::Job now;
-  changed_.wait_for(lock, timeout, [&] {
-    now = message(id);
-    return stopping_ || is_over(now) || now.revision() != seen;
-  });
+  ++watchers_;
+  dispatch_needed_.notify_one();
+  jobs_changed_.wait_for(lock, timeout, [&] { return stopping_ || revision_of(id) != seen; });
+  --watchers_;
   check_running();
-  return now;
+  return message(id);
 }
 
-void Scheduler::tick() {
-  std::unique_lock lock(mutex_);
-  while (!stopping_) {
-    changed_.wait_for(lock, kTick, [&] { return stopping_; });
-    try {
-      apply(TickEvent{}, nullptr);
-    } catch (const core::Error& error) {
-      spdlog::error("event=journal_failed message=\"{}\"", error.what());
-      return;
-    }
-    std::erase_if(sequences_,
-                  [&](const auto& entry) { return !queue_.workers().contains(entry.first); });
-  }
+// Nothing of a job that has ended: its last message is told whatever the caller saw.
+std::optional<std::uint64_t> Scheduler::revision_of(const std::string& id) const {
+  const JobState* const job = queue_.job(id);
+  return job == nullptr ? std::nullopt
+                        : std::optional(files_.at(id).first_revision + job->revision);
 }
 
 }  // namespace weft::coordinator

@@ -8,17 +8,24 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "coordinator/catalogue.h"
 #include "coordinator/journal.h"
 #include "coordinator/messages.h"
+#include "coordinator/order_log.h"
 #include "coordinator/queue.h"
+#include "coordinator/waiting_calls.h"
 #include "core/clock.h"
 #include "proto/weft/v1/cluster.pb.h"
+#include "security/caller.h"
 #include "storage/blob_store.h"
 
 namespace weft::coordinator {
@@ -33,10 +40,19 @@ struct SchedulerOptions {
   std::filesystem::path state_folder;  // journal.db, blobs/, versions/, committing/
   QueueSettings queue;
   CommitFunction commit;
+  // Nothing is submitted any more when the journal has grown to so much.
+  std::uint64_t journal_limit_bytes = std::uint64_t{16} << 30;
 };
 
 inline constexpr std::size_t kUnfinishedJobsLimit = 1000;
 inline constexpr std::size_t kEndedJobsLimit = 1000;  // kept in memory, and listed
+
+// What a person orders about a job or a worker. The same request_id again changes nothing.
+struct Order {
+  std::string request_id;
+  std::string subject;  // a job's id or its beginning; a worker's name, id or its beginning
+  security::Caller caller;
+};
 
 // The coordinator without its network: turns calls into events of the queue, makes what they did
 // durable before it answers, and plans and commits in threads of its own. Any thread may call.
@@ -54,22 +70,34 @@ class Scheduler {
   Scheduler& operator=(Scheduler&&) = delete;
 
   // Errors as cluster.proto states them for the calls of the same names.
-  [[nodiscard]] v1::Job submit(const v1::SubmitRequest& request);
-  [[nodiscard]] v1::Job cancel(const std::string& job_id);
+  [[nodiscard]] v1::Job submit(const v1::SubmitRequest& request, const security::Caller& caller);
+  [[nodiscard]] v1::Job cancel(const Order& order);
+  [[nodiscard]] v1::Job pause(const Order& order, bool is_paused);
+  [[nodiscard]] v1::Job retry(const Order& order);
+  [[nodiscard]] v1::Job set_priority(const Order& order, std::int32_t priority);
   [[nodiscard]] v1::Job job(const std::string& id_or_beginning);
   [[nodiscard]] std::vector<v1::Job> jobs(bool unfinished_only, std::size_t limit);
+  [[nodiscard]] std::vector<v1::AttemptInfo> attempts(const v1::ListAttemptsRequest& request);
+
   [[nodiscard]] std::vector<v1::Worker> workers();
+  // Both answer with all workers of that name.
+  [[nodiscard]] std::vector<v1::Worker> drain(const Order& order, bool is_drained);
+  [[nodiscard]] std::vector<v1::Worker> unblock(const Order& order, const std::string& stage);
 
   // The job as soon as its revision is another than `seen`, or after `timeout`.
   [[nodiscard]] v1::Job wait_for_change(const std::string& job_id, std::uint64_t seen,
                                         std::chrono::milliseconds timeout);
 
-  // One exchange with a worker; waits while there is nothing to say, until wait_ms is over or
-  // `is_cancelled` says so (asked about once a second). Nothing when a newer call of this worker
-  // came. The blobs of the results that `report` names are known to be there.
-  [[nodiscard]] std::optional<v1::SynchronizeResponse> synchronize(
-      ReportEvent report, std::uint64_t sequence, std::chrono::milliseconds wait,
-      const std::function<bool()>& is_cancelled);
+  // One exchange with a worker. `answer` is called once, by any thread, before or after this
+  // returns: with a response when there is something to say and it is durable, or when `wait` is
+  // over; with nothing when a newer call of this worker came or this one was abandoned; with what
+  // went wrong. It must not throw and not call the scheduler. The blobs of the results that
+  // `report` names are known to be there. Throws what is wrong with the call itself.
+  void synchronize(ReportEvent report, std::uint64_t sequence, std::chrono::milliseconds wait,
+                   ExchangeAnswer answer);
+  // The call with this sequence was cancelled or its connection closed. A worker that makes no
+  // newer one within QueueSettings::disconnect_ms is lost.
+  void abandon(const std::string& worker, std::uint64_t sequence);
 
   // A blob that was there is damaged or gone: forgets the results that it was, so that they are
   // computed again.
@@ -78,7 +106,7 @@ class Scheduler {
   [[nodiscard]] storage::BlobStore& blobs() { return blobs_; }
   [[nodiscard]] const Catalogue& catalogue() const { return catalogue_; }
 
-  // Ends all waiting calls; those and further ones throw core::Error(kUnavailable).
+  // Ends all waiting calls; those and further ones get core::Error(kUnavailable).
   void stop();
   // Why the process must end (the journal cannot be written), if it must.
   [[nodiscard]] std::optional<std::string> fatal_problem();
@@ -88,29 +116,75 @@ class Scheduler {
   struct JobFile {
     v1::FabricDescription description;
     std::string comment;
+    std::string user;
     std::map<StageName, Stage> stages;  // planned, of the present generation
     std::uint32_t generation = 0;
+    std::uint64_t first_revision = 0;  // of a job that was put back into the queue
+    std::string problem;               // why its database could not be assembled yet
     std::optional<VersionRecord> version;
   };
-  using Task = std::variant<PlanAction, CommitAction>;
+  struct Task {
+    std::variant<PlanAction, CommitAction> what;
+    std::uint32_t tries = 0;
+    Time not_before{};
+  };
+  // What is to be said as soon as the ticket is durable, without mutex_.
+  struct PendingAnswer {
+    Journal::Ticket ticket = 0;
+    v1::SynchronizeResponse response;
+    std::optional<core::Error> problem;
+    ExchangeAnswer answer;
+  };
+  // Results that were recorded or forgotten while a stage's known results are looked up.
+  struct RecentResults {
+    bool is_kept = false;
+    std::unordered_map<core::Digest, std::optional<KeptResult>, core::DigestHash> by_shard;
+    std::unordered_set<core::Digest, core::DigestHash> lost;
+  };
 
+  // REQUIRES of all of these: mutex_ is held.
   void load();
-  Journal::Ticket apply(const Event& event, Reply* reply);           // REQUIRES: mutex_ is held
-  std::optional<v1::Job> submitted_before(const JobRecord& record);  // REQUIRES: mutex_ is held
+  void load(const JobRecord& record);
+  Journal::Ticket apply(const Event& event, Reply* reply, std::vector<Record> records = {});
+  void log(const Actions& actions) const;
+  std::optional<v1::Job> submitted_before(const JobRecord& record);
+  void check_limits(const std::string& user) const;
   void end_job(const std::string& id, std::vector<Record>& records);
-  void work_through(std::deque<Task>& tasks);
-  void run(const PlanAction& task);
-  void run(const CommitAction& task);
-  void report(const Event& event);
-  void tick();
-  PlannedStage with_known(const std::string& job, const Stage& stage,
-                          std::vector<core::Digest> digests);
-  [[nodiscard]] std::string read_blob(const core::Digest& digest);
-  [[nodiscard]] v1::Job message(const std::string& id) const;  // REQUIRES: mutex_ is held
+  [[nodiscard]] v1::Job message(const std::string& id) const;
   [[nodiscard]] std::string full_id(const std::string& beginning) const;
+  [[nodiscard]] std::optional<std::uint64_t> revision_of(const std::string& id) const;
+  [[nodiscard]] std::string worker_name(const std::string& name_or_id) const;
   [[nodiscard]] v1::Assignment message(const AssignAction& assign) const;
   [[nodiscard]] v1::SynchronizeResponse message(const Reply& reply) const;
   void check_running() const;
+
+  // orders (scheduler_orders.cpp); `change` is called with mutex_ held, unless the order is a
+  // repeated one, to add its own to the records and apply its event
+  using Change = std::function<Journal::Ticket(const std::string& subject, std::vector<Record>)>;
+  v1::Job change_job(const Order& order, bool must_be_unfinished, const Change& change);
+  std::vector<v1::Worker> change_worker(const Order& order, const Change& change);
+  Journal::Ticket put_back(const std::string& id, std::vector<Record> records);
+
+  // planning and committing (scheduler_work.cpp)
+  void work_through(std::deque<Task>& tasks);
+  void work_on(Task task, std::deque<Task>& tasks);
+  bool put_off(Task task, std::deque<Task>& tasks, const std::string& problem);
+  void run(const PlanAction& task);
+  void run(const CommitAction& task);
+  void report(const Event& event);
+  std::vector<PlannedStage> look_up(const std::string& job, const std::vector<Stage>& stages,
+                                    const core::Digest& fingerprint);
+  void add_recent(PlannedStage& stage) const;  // REQUIRES: mutex_ is held
+  [[nodiscard]] std::string read_blob(const core::Digest& digest);
+
+  // waiting calls (scheduler_exchange.cpp); mutex_ is held but in dispatch and send
+  void dispatch();
+  void dispatch_once(Time now, std::vector<PendingAnswer>& answers);
+  bool look_at(const std::string& worker, bool must_answer, std::vector<PendingAnswer>& answers);
+  void serve_hungry(std::vector<PendingAnswer>& answers);
+  void tick();
+  [[nodiscard]] Time next_dispatch() const;
+  void send(std::vector<PendingAnswer> answers);
 
   SchedulerOptions options_;
   const core::Clock& clock_;
@@ -119,21 +193,34 @@ class Scheduler {
   Catalogue catalogue_;
 
   std::mutex mutex_;  // of everything below
-  std::condition_variable changed_;
   Queue queue_;
   std::map<std::string, JobFile> files_;  // of unfinished jobs
+  std::map<std::string, std::uint64_t> unfinished_of_user_;
   std::map<std::string, v1::Job> ended_;
   std::deque<std::string> ended_order_;  // oldest first
-  std::map<std::string, std::uint64_t> sequences_;
-  std::uint64_t wakes_ = 0;
+  OrderLog orders_;
+  RecentResults recent_;
+
+  std::condition_variable tasks_changed_;
   std::deque<Task> to_plan_;
   std::deque<Task> to_commit_;
+
+  std::condition_variable jobs_changed_;  // told at most ten times a second
+  std::uint64_t watchers_ = 0;
+
+  std::condition_variable dispatch_needed_;
+  std::map<std::string, std::uint64_t> sequences_;  // of the newest call, by worker
+  WaitingCalls waiting_;
+  std::map<std::string, Time> gone_;  // workers whose connection closed, and when they are lost
+  bool is_wake_pending_ = false;      // calls that want something may now get it
+  Time next_tick_{};
+
   std::string fatal_;
   bool stopping_ = false;
 
   std::thread planner_;
   std::thread committer_;
-  std::thread ticker_;
+  std::thread dispatcher_;
 };
 
 }  // namespace weft::coordinator

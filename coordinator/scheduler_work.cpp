@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -6,7 +7,7 @@
 #include "coordinator/scheduler.h"
 #include "core/error.h"
 
-// What the scheduler does in its own threads, planning and committing, and its talk with workers.
+// What the scheduler does in threads of its own: planning and committing.
 
 namespace weft::coordinator {
 
@@ -24,12 +25,15 @@ class BlobLost : public core::Error {
   core::Digest digest_;
 };
 
-v1::AttemptName message_of(const AttemptName& name) {
-  v1::AttemptName message;
-  message.set_job_id(name.job);
-  message.set_attempt(name.attempt);
-  return message;
+// What a disk or a limit of ours keeps from being done, and may be possible later.
+bool is_short(const core::Error& error) {
+  return error.code() == core::Code::kUnavailable || error.code() == core::Code::kResourceExhausted;
 }
+
+constexpr auto kLook = std::chrono::seconds(1);  // how often what was put off is looked at
+constexpr std::uint32_t kTriesLimit = 20;
+constexpr std::chrono::milliseconds kFirstPause{1'000};
+constexpr std::chrono::milliseconds kLongestPause{60'000};
 
 }  // namespace
 
@@ -44,30 +48,71 @@ std::string Scheduler::read_blob(const core::Digest& digest) {
 void Scheduler::result_lost(const core::Digest& result) { report(ResultLostEvent{result}); }
 
 void Scheduler::work_through(std::deque<Task>& tasks) {
-  for (;;) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return stopping_ || !tasks.empty(); });
-    if (stopping_) {
-      return;
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    const Time now = clock_.now();
+    const auto ready = std::find_if(tasks.begin(), tasks.end(),
+                                    [&](const Task& task) { return task.not_before <= now; });
+    if (ready == tasks.end()) {
+      tasks_changed_.wait_for(lock, kLook);
+      continue;
     }
-    const Task task = tasks.front();
-    tasks.pop_front();
+    Task task = std::move(*ready);
+    tasks.erase(ready);
     lock.unlock();
-    try {
-      std::visit([&](const auto& t) { run(t); }, task);
-    } catch (const BlobLost& lost) {
-      report(ResultLostEvent{lost.digest()});
-    } catch (const std::exception& error) {
-      report(std::visit(
-          [&](const auto& t) {
-            const bool is_plan = std::is_same_v<std::decay_t<decltype(t)>, PlanAction>;
-            return JobFailedEvent{
-                t.job, t.generation,
-                std::string(is_plan ? "planning: " : "assembling the database: ") + error.what()};
-          },
-          task));
+    work_on(std::move(task), tasks);
+    lock.lock();
+    if (&tasks == &to_plan_) {
+      recent_ = {};
     }
   }
+}
+
+void Scheduler::work_on(Task task, std::deque<Task>& tasks) {
+  const bool is_plan = std::holds_alternative<PlanAction>(task.what);
+  std::string problem;
+  try {
+    std::visit([&](const auto& t) { run(t); }, task.what);
+    return;
+  } catch (const BlobLost& lost) {
+    report(ResultLostEvent{lost.digest()});
+    return;
+  } catch (const core::Error& error) {
+    problem = error.what();
+    if (is_short(error) && put_off(task, tasks, problem)) {
+      return;
+    }
+  } catch (const std::exception& error) {
+    problem = error.what();
+  }
+  std::visit(
+      [&](const auto& t) {
+        report(JobFailedEvent{
+            t.job, t.generation,
+            std::string(is_plan ? "planning: " : "assembling the database: ") + problem});
+      },
+      task.what);
+}
+
+// Our own disk is full or failing, which is no fault of the job: it is tried again for a quarter of
+// an hour. Whether it will be.
+bool Scheduler::put_off(Task task, std::deque<Task>& tasks, const std::string& problem) {
+  if (++task.tries >= kTriesLimit) {
+    return false;
+  }
+  const std::string job = std::visit([](const auto& t) { return t.job; }, task.what);
+  const auto pause = std::min<std::chrono::milliseconds>(
+      kFirstPause * (1U << std::min(task.tries - 1, 10U)), kLongestPause);
+  spdlog::warn("job={} event=put_off tries={} retry_ms={} message=\"{}\"", job, task.tries,
+               pause.count(), problem);
+  const std::lock_guard lock(mutex_);
+  task.not_before = clock_.now() + pause;
+  const auto file = files_.find(job);
+  if (file != files_.end()) {
+    file->second.problem = "the coordinator's disk: " + problem;
+  }
+  tasks.push_back(std::move(task));
+  return true;
 }
 
 // Tells the queue what a task of ours met. When the journal cannot be written, fatal_ says so and
@@ -78,6 +123,9 @@ void Scheduler::report(const Event& event) {
     check_running();
     const auto* const lost = std::get_if<ResultLostEvent>(&event);
     if (lost != nullptr) {
+      if (recent_.is_kept) {
+        recent_.lost.insert(lost->result);
+      }
       const std::uint64_t shards = journal_.forget_result(lost->result);
       if (shards > 0) {
         spdlog::warn("result={} event=lost shards={}", lost->result.hex(), shards);
@@ -89,24 +137,56 @@ void Scheduler::report(const Event& event) {
   }
 }
 
-// The stage as the queue knows it, with all that need not be computed. REQUIRES: mutex_ is held, so
-// that no result falls between this look-up and the queue.
-PlannedStage Scheduler::with_known(const std::string& job, const Stage& stage,
-                                   std::vector<core::Digest> digests) {
-  PlannedStage planned;
-  planned.name = stage.name;
-  const std::vector<std::optional<core::Digest>> results = journal_.results_of(digests);
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    if (results[i] && blobs_.has(*results[i])) {
-      planned.known.push_back({i, *results[i], {}, false});
+// The stages as the queue knows them, with all that need not be computed. Looks results up without
+// mutex_, which may take seconds for a million shards; add_recent then adds what fell in between.
+std::vector<PlannedStage> Scheduler::look_up(const std::string& job,
+                                             const std::vector<Stage>& stages,
+                                             const core::Digest& fingerprint) {
+  std::vector<PlannedStage> planned;
+  for (const Stage& stage : stages) {
+    PlannedStage& of_stage = planned.emplace_back();
+    of_stage.name = stage.name;
+    of_stage.digests = shard_digests(stage, fingerprint);
+    of_stage.memory_bytes = stage.memory_bytes;
+    if (!stage.inputs.empty()) {
+      of_stage.scene = stage.inputs.front();
+    }
+    std::vector<std::optional<KeptResult>> results = journal_.results_of(of_stage.digests);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      if (results[i] && blobs_.has(results[i]->result)) {
+        of_stage.known.push_back(
+            {i, results[i]->result, std::move(results[i]->worker), results[i]->is_audited});
+      }
+    }
+    for (FailureRecord& failure : journal_.failures_of(job, stage.name)) {
+      of_stage.failures.push_back(
+          {failure.kind, failure.shard, std::move(failure.worker), std::move(failure.message)});
+    }
+    for (AttemptRecord& attempt : journal_.running_attempts(job, stage.name)) {
+      of_stage.attempts.push_back({attempt.attempt, attempt.first_shard, attempt.shards,
+                                   std::move(attempt.worker), std::move(attempt.worker_name),
+                                   attempt.purpose});
     }
   }
-  for (FailureRecord& failure : journal_.failures_of(job, stage.name)) {
-    planned.failures.push_back(
-        {failure.kind, failure.shard, std::move(failure.worker), std::move(failure.message)});
-  }
-  planned.digests = std::move(digests);
   return planned;
+}
+
+void Scheduler::add_recent(PlannedStage& stage) const {
+  if (recent_.by_shard.empty() && recent_.lost.empty()) {
+    return;
+  }
+  std::erase_if(stage.known, [&](const KnownResult& known) {
+    return recent_.lost.contains(known.result) ||
+           recent_.by_shard.contains(stage.digests[known.shard]);
+  });
+  for (std::uint64_t shard = 0; shard < stage.digests.size(); ++shard) {
+    const auto recent = recent_.by_shard.find(stage.digests[shard]);
+    if (recent != recent_.by_shard.end() && recent->second &&
+        !recent_.lost.contains(recent->second->result)) {
+      stage.known.push_back(
+          {shard, recent->second->result, recent->second->worker, recent->second->is_audited});
+    }
+  }
 }
 
 void Scheduler::run(const PlanAction& task) {
@@ -117,39 +197,39 @@ void Scheduler::run(const PlanAction& task) {
   }
   const v1::FabricDescription description = files_.at(task.job).description;
   const std::vector<StageResults> finished = queue_.finished_stages(*job);
+  std::set<StageName> known;
+  if (files_.at(task.job).generation == task.generation) {
+    for (const auto& [name, stage] : files_.at(task.job).stages) {
+      known.insert(name);
+    }
+  }
+  recent_ = {true, {}, {}};
   lock.unlock();
 
   std::vector<Stage> stages =
       plan(description, finished, [this](const core::Digest& digest) { return read_blob(digest); });
-  std::vector<std::vector<core::Digest>> digests;
-  for (const Stage& stage : stages) {
-    std::vector<core::Digest>& works = digests.emplace_back();
-    works.reserve(stage.shard_count);
-    for (std::uint64_t shard = 0; shard < stage.shard_count; ++shard) {
-      works.push_back(shard_digest(stage, shard, task.fingerprint));
-    }
-  }
+  std::erase_if(stages, [&](const Stage& stage) { return known.contains(stage.name); });
+  PlannedEvent event{task.job, task.generation, look_up(task.job, stages, task.fingerprint)};
 
   lock.lock();
   const auto file = files_.find(task.job);
   if (file == files_.end()) {
     return;  // it has ended meanwhile
   }
+  file->second.problem.clear();
   if (file->second.generation != task.generation) {
     file->second.generation = task.generation;
     file->second.stages.clear();
   }
-  PlannedEvent event{task.job, task.generation, {}};
   for (std::size_t i = 0; i < stages.size(); ++i) {
-    const StageName name = stages[i].name;
-    if (!file->second.stages.contains(name)) {
-      event.stages.push_back(with_known(task.job, stages[i], std::move(digests[i])));
-      const PlannedStage& planned = event.stages.back();
-      spdlog::info("job={} stage={} event=planned shards={} cached={}", task.job, to_string(name),
-                   planned.digests.size(), planned.known.size());
-      file->second.stages.emplace(name, std::move(stages[i]));
-    }
+    PlannedStage& planned = event.stages[i];
+    add_recent(planned);
+    spdlog::info("job={} stage={} event=planned shards={} cached={} running={}", task.job,
+                 to_string(planned.name), planned.digests.size(), planned.known.size(),
+                 planned.attempts.size());
+    file->second.stages.emplace(planned.name, std::move(stages[i]));
   }
+  recent_ = {};
   apply(event, nullptr);
 }
 
@@ -180,6 +260,7 @@ void Scheduler::run(const CommitAction& task) {
     return;
   }
   JobFile& file = files_.at(task.job);
+  file.problem.clear();
   publication.comment = file.comment;
   publication.now_ms = to_ms(clock_.now());
   file.version = catalogue_.publish(publication);
@@ -187,94 +268,6 @@ void Scheduler::run(const CommitAction& task) {
                file.version->fabric, file.version->number, file.version->content_digest.hex(),
                file.version->size_bytes);
   apply(CommittedEvent{task.job, task.generation}, nullptr);
-}
-
-v1::Assignment Scheduler::message(const AssignAction& assign) const {
-  const JobFile& file = files_.at(assign.job);
-  const Stage& stage = file.stages.at(assign.stage);
-  v1::Assignment message;
-  message.mutable_name()->set_job_id(assign.job);
-  message.mutable_name()->set_attempt(assign.attempt);
-  message.set_lease_token(assign.token);
-  message.set_lease_ms(assign.lease_ms);
-  message.set_fabric(file.description.name());
-  message.set_stage(to_string(assign.stage));
-  *message.mutable_spec() = stage.spec;
-  message.set_shard_count(stage.shard_count);
-  for (const core::Digest& input : stage.inputs) {
-    message.add_inputs(input.binary());
-  }
-  message.set_first_shard(assign.first_shard);
-  message.set_shards(assign.shards);
-  for (std::uint64_t i = 0; i < assign.shards && !stage.shard_inputs.empty(); ++i) {
-    message.add_shard_inputs(stage.shard_inputs[assign.first_shard + i].binary());
-  }
-  return message;
-}
-
-v1::SynchronizeResponse Scheduler::message(const Reply& reply) const {
-  v1::SynchronizeResponse response;
-  for (const AssignAction& assign : reply.assignments) {
-    *response.add_assignments() = message(assign);
-  }
-  for (const AttemptName& name : reply.leases) {
-    v1::Lease& lease = *response.add_leases();
-    *lease.mutable_name() = message_of(name);
-    lease.set_lease_ms(options_.queue.lease_ms);
-  }
-  for (const AttemptName& name : reply.stop) {
-    *response.add_stop() = message_of(name);
-  }
-  for (const AttemptName& name : reply.acknowledged) {
-    *response.add_acknowledged() = message_of(name);
-  }
-  return response;
-}
-
-std::optional<v1::SynchronizeResponse> Scheduler::synchronize(
-    ReportEvent report, std::uint64_t sequence, std::chrono::milliseconds wait,
-    const std::function<bool()>& is_cancelled) {
-  std::unique_lock lock(mutex_);
-  check_running();
-  const auto known = queue_.workers().find(report.worker);
-  if (known != queue_.workers().end() && known->second.fingerprint != report.fingerprint) {
-    throw core::Error(core::Code::kFailedPrecondition,
-                      "worker " + report.worker +
-                          " is known with another numerics fingerprint; start it again, under a "
-                          "new worker_id");
-  }
-  if (known == queue_.workers().end() && !report.leaving) {
-    spdlog::info("worker={} name={} threads={} event=joined", report.worker, report.name,
-                 report.threads);
-  }
-  std::uint64_t& newest = sequences_[report.worker];
-  if (sequence <= newest) {
-    return std::nullopt;
-  }
-  newest = sequence;
-  const Time deadline = clock_.now() + wait;
-  for (;;) {
-    Reply reply;
-    const std::uint64_t wakes = wakes_;
-    const Journal::Ticket ticket = apply(report, &reply);
-    const bool has_news =
-        !reply.assignments.empty() || !reply.stop.empty() || !reply.acknowledged.empty();
-    const Time now = clock_.now();
-    if (has_news || report.leaving || now >= deadline) {
-      v1::SynchronizeResponse response = message(reply);
-      lock.unlock();
-      journal_.wait(ticket);
-      return response;
-    }
-    // Back-offs and retries become due without an event, so look again now and then.
-    changed_.wait_for(lock, std::min(std::chrono::milliseconds(1000), deadline - now), [&] {
-      return stopping_ || wakes_ != wakes || sequences_[report.worker] != sequence;
-    });
-    check_running();
-    if (sequences_[report.worker] != sequence || is_cancelled()) {
-      return std::nullopt;
-    }
-  }
 }
 
 }  // namespace weft::coordinator

@@ -8,6 +8,12 @@
 
 namespace weft::coordinator {
 
+namespace {
+
+constexpr std::size_t kIdleLimit = 128;  // statements kept compiled
+
+}  // namespace
+
 Connection::Connection(const std::filesystem::path& file) : file_(file.string()) {
   const int result =
       sqlite3_open_v2(file_.c_str(), &handle_,
@@ -19,7 +25,37 @@ Connection::Connection(const std::filesystem::path& file) : file_(file.string())
   }
 }
 
-Connection::~Connection() { sqlite3_close(handle_); }
+Connection::~Connection() {
+  for (const auto& [sql, statement] : idle_) {
+    sqlite3_finalize(statement);
+  }
+  sqlite3_close(handle_);
+}
+
+sqlite3_stmt* Connection::take(const char* sql) {
+  const auto found = idle_.find(sql);
+  if (found != idle_.end()) {
+    sqlite3_stmt* const statement = found->second;
+    idle_.erase(found);
+    return statement;
+  }
+  sqlite3_stmt* statement = nullptr;
+  if (sqlite3_prepare_v3(handle_, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr) !=
+      SQLITE_OK) {
+    fail();
+  }
+  return statement;
+}
+
+void Connection::give_back(sqlite3_stmt* statement) {
+  sqlite3_reset(statement);
+  sqlite3_clear_bindings(statement);
+  const bool is_kept =
+      idle_.size() < kIdleLimit && idle_.try_emplace(sqlite3_sql(statement), statement).second;
+  if (!is_kept) {
+    sqlite3_finalize(statement);
+  }
+}
 
 void Connection::run(const char* sql) {
   if (sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr) != SQLITE_OK) {
@@ -44,13 +80,10 @@ void Connection::fail() const {
   throw core::Error(core::Code::kUnavailable, what + "; check the disk, then start again");
 }
 
-Statement::Statement(Connection& connection, const char* sql) : connection_(connection) {
-  if (sqlite3_prepare_v2(connection.handle_, sql, -1, &handle_, nullptr) != SQLITE_OK) {
-    connection.fail();
-  }
-}
+Statement::Statement(Connection& connection, const char* sql)
+    : connection_(connection), handle_(connection.take(sql)) {}
 
-Statement::~Statement() { sqlite3_finalize(handle_); }
+Statement::~Statement() { connection_.give_back(handle_); }
 
 Statement& Statement::text(const std::string& value) {
   check(sqlite3_bind_text64(handle_, ++bound_, value.data(), value.size(), SQLITE_TRANSIENT,
@@ -67,6 +100,11 @@ Statement& Statement::blob(const std::string& value) {
 
 Statement& Statement::number(std::uint64_t value) {
   check(sqlite3_bind_int64(handle_, ++bound_, static_cast<sqlite3_int64>(value)));
+  return *this;
+}
+
+Statement& Statement::real(double value) {
+  check(sqlite3_bind_double(handle_, ++bound_, value));
   return *this;
 }
 
@@ -101,6 +139,8 @@ std::uint64_t Statement::number_of(int column) const {
 std::int64_t Statement::signed_of(int column) const {
   return sqlite3_column_int64(handle_, column);
 }
+
+double Statement::real_of(int column) const { return sqlite3_column_double(handle_, column); }
 
 core::Digest Statement::digest_of(int column) const {
   const std::optional<core::Digest> digest = core::Digest::from_binary(bytes_of(column));

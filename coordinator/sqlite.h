@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <unordered_map>
 
 #include "core/digest.h"
 
@@ -33,11 +34,17 @@ class Connection {
   friend class Statement;
   [[noreturn]] void fail() const;
 
+  // A statement that was prepared before and is not in use, or a new one.
+  [[nodiscard]] sqlite3_stmt* take(const char* sql);
+  void give_back(sqlite3_stmt* statement);
+
   std::string file_;
   sqlite3* handle_ = nullptr;
+  std::unordered_map<std::string, sqlite3_stmt*> idle_;  // by text
 };
 
-// One prepared statement: bind its parameters in order, then step through its rows.
+// One prepared statement: bind its parameters in order, then step through its rows. Its text is
+// compiled once for a connection.
 class Statement {
  public:
   Statement(Connection& connection, const char* sql);
@@ -50,6 +57,7 @@ class Statement {
   Statement& text(const std::string& value);
   Statement& blob(const std::string& value);
   Statement& number(std::uint64_t value);
+  Statement& real(double value);
   Statement& null();
 
   // Whether there is a(nother) row.
@@ -61,6 +69,7 @@ class Statement {
   [[nodiscard]] std::string bytes_of(int column) const;
   [[nodiscard]] std::uint64_t number_of(int column) const;
   [[nodiscard]] std::int64_t signed_of(int column) const;
+  [[nodiscard]] double real_of(int column) const;
   // Throws core::Error(kDataLoss) when the column holds no digest.
   [[nodiscard]] core::Digest digest_of(int column) const;
 

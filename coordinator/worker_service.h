@@ -6,11 +6,14 @@
 namespace weft::coordinator {
 
 // What workers call, and the list of workers for people. Contracts: cluster.proto.
-class WorkerService final : public v1::WorkerService::Service {
+// Synchronize waits without a thread, by gRPC's callbacks.
+class WorkerService final
+    : public v1::WorkerService::WithCallbackMethod_Synchronize<v1::WorkerService::Service> {
  public:
   explicit WorkerService(Scheduler& scheduler) : scheduler_(scheduler) {}
-  grpc::Status Synchronize(grpc::ServerContext* context, const v1::SynchronizeRequest* request,
-                           v1::SynchronizeResponse* response) override;
+  grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext* context,
+                                        const v1::SynchronizeRequest* request,
+                                        v1::SynchronizeResponse* response) override;
 
  private:
   Scheduler& scheduler_;
@@ -21,6 +24,10 @@ class WorkersService final : public v1::WorkersService::Service {
   explicit WorkersService(Scheduler& scheduler) : scheduler_(scheduler) {}
   grpc::Status ListWorkers(grpc::ServerContext* context, const v1::ListWorkersRequest* request,
                            v1::ListWorkersResponse* response) override;
+  grpc::Status DrainWorker(grpc::ServerContext* context, const v1::DrainWorkerRequest* request,
+                           v1::DrainWorkerResponse* response) override;
+  grpc::Status UnblockWorker(grpc::ServerContext* context, const v1::UnblockWorkerRequest* request,
+                             v1::UnblockWorkerResponse* response) override;
 
  private:
   Scheduler& scheduler_;

@@ -10,7 +10,6 @@
 
 #include "client/fabric_cache.h"
 #include "render/load_fabric.h"
-#include "security/endpoint.h"
 
 namespace weft::render {
 
@@ -23,9 +22,8 @@ namespace weft::render {
 // asks (resident, resident_bytes), any thread.
 class FabricStore {
  public:
-  // `memory_limit_bytes`: of fabrics and pictures together.
-  FabricStore(const security::Endpoint& coordinator, client::FabricCache cache,
-              std::uint64_t memory_limit_bytes);
+  // `coordinator`: its address. `memory_limit_bytes`: of fabrics and pictures together.
+  FabricStore(std::string coordinator, client::FabricCache cache, std::uint64_t memory_limit_bytes);
 
   // Frees what is not needed so that `bytes` and the fabrics fit the limit. Throws
   // core::Error(kResourceExhausted) with the figures when the bytes alone exceed it.
