@@ -24,7 +24,7 @@ constexpr const char* kHelp =
     "          weft explain worker render-07 --json";
 
 struct ExplainOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string kind;
   std::string subject;
   bool wants_json = false;

@@ -75,7 +75,8 @@ std::filesystem::path environment_cache_folder() {
   return folder.empty() ? folder : folder / "environments";
 }
 
-std::filesystem::path resolve_fabric(const std::string& reference, const std::string& coordinator) {
+std::filesystem::path resolve_fabric(const std::string& reference,
+                                     const security::Endpoint& coordinator) {
   const std::optional<FabricReference> parsed = parse_reference(reference);
   if (!parsed) {
     std::error_code failure;

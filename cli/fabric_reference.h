@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "security/endpoint.h"
+
 namespace weft::cli {
 
 // A published fabric: a name and a version number, or the latest.
@@ -25,7 +27,7 @@ struct FabricReference {
 // file of such a name. Throws core::Error: kNotFound when there is no such file, fabric or version,
 // kUnavailable when the coordinator does not answer.
 [[nodiscard]] std::filesystem::path resolve_fabric(const std::string& reference,
-                                                   const std::string& coordinator);
+                                                   const security::Endpoint& coordinator);
 
 // Where fetched databases are kept: $XDG_CACHE_HOME/weft/fabrics, else ~/.cache/weft/fabrics.
 [[nodiscard]] std::filesystem::path fabric_cache_folder();

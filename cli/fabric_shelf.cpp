@@ -7,7 +7,7 @@
 
 namespace weft::cli {
 
-FabricShelf::FabricShelf(std::string main_reference, std::string coordinator,
+FabricShelf::FabricShelf(std::string main_reference, security::Endpoint coordinator,
                          render::Fabric::Wanted wanted)
     : main_reference_(std::move(main_reference)),
       coordinator_(std::move(coordinator)),

@@ -5,6 +5,7 @@
 
 #include "cli/picture_metadata.h"
 #include "render/load_fabric.h"
+#include "security/endpoint.h"
 
 namespace weft::cli {
 
@@ -13,7 +14,8 @@ class FabricShelf {
  public:
   // `main_reference` is what an empty reference means; published versions are fetched from
   // `coordinator`.
-  FabricShelf(std::string main_reference, std::string coordinator, render::Fabric::Wanted wanted);
+  FabricShelf(std::string main_reference, security::Endpoint coordinator,
+              render::Fabric::Wanted wanted);
 
   // Loads what `reference` (a database's or description's path, or a published version) names.
   // Throws core::Error.
@@ -24,7 +26,7 @@ class FabricShelf {
 
  private:
   std::string main_reference_;
-  std::string coordinator_;
+  security::Endpoint coordinator_;
   render::Fabric::Wanted wanted_;
   std::map<std::string, render::LoadedFabric> fabrics_;
 };

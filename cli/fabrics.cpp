@@ -20,7 +20,7 @@ constexpr const char* kHelp =
     "Example: weft fabrics";
 
 struct FabricsOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   bool wants_json = false;
 };
 

@@ -26,7 +26,7 @@ constexpr const char* kHelp =
     "Example: weft fetch silk@latest -o silk.h5";
 
 struct FetchOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string reference;
   std::string output;
   bool wants_json = false;

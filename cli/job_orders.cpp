@@ -41,7 +41,7 @@ constexpr const char* kPriorityHelp =
     "Example: weft priority j4f1c02a9d3be 10";
 
 struct OrderOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string job;
   std::int32_t priority = 0;
   bool wants_json = false;

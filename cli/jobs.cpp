@@ -23,7 +23,7 @@ constexpr const char* kHelp =
     "Example: weft jobs --unfinished";
 
 struct JobsOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::uint32_t limit = 20;
   bool is_unfinished_only = false;
   bool wants_json = false;

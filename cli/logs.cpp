@@ -32,7 +32,7 @@ constexpr std::chrono::seconds kReadDeadline{120};
 constexpr std::chrono::hours kFollowDeadline{24 * 30};
 
 struct LogsOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string job;
   std::string task;
   std::uint64_t attempt = 0;

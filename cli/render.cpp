@@ -124,7 +124,8 @@ void run(RenderOptions options) {
                             "--device away, or draw without --node");
     }
     check_published(scene);
-    node.emplace(options.node);
+    node.emplace(security::Endpoint(options.node, options.coordinator.tls_folder,
+                                    options.coordinator.insecure));
   }
   const auto identities = [&] { return node ? identities_of(*node) : shelf.identities(); };
   const auto should_stop = [&] { return interrupt.requested(); };

@@ -7,12 +7,13 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/weft/v1/scene.pb.h"
+#include "security/endpoint.h"
 
 namespace weft::cli {
 
 // What a person may say to `weft render`.
 struct RenderOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string fabric;
   std::string scene;
   std::string again;

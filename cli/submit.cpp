@@ -32,7 +32,7 @@ constexpr const char* kHelp =
     "Example: weft submit examples/tiny.textproto --quality preview --wait -o tiny.h5";
 
 struct SubmitFlags {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string fabric;
   std::string output;
   std::string quality;

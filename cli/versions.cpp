@@ -20,7 +20,7 @@ constexpr const char* kHelp =
     "Example: weft versions silk";
 
 struct VersionsOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string fabric;
   bool wants_json = false;
 };

@@ -21,7 +21,7 @@ constexpr const char* kHelp =
     "Example: weft watch j4f1c02a9d3be";
 
 struct WatchOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string job;
   bool wants_json = false;
 };

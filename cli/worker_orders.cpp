@@ -29,7 +29,7 @@ constexpr const char* kUnblockHelp =
     "Example: weft unblock render-07 --stage transfer";
 
 struct OrderOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   std::string worker;
   std::string stage;
   bool is_undone = false;

@@ -22,7 +22,7 @@ constexpr const char* kHelp =
     "Example: weft workers --json";
 
 struct WorkersOptions {
-  std::string coordinator;
+  security::Endpoint coordinator;
   bool wants_json = false;
 };
 

@@ -4,14 +4,14 @@
 
 #include <fmt/format.h>
 
-#include "client/channel.h"
 #include "core/error.h"
 #include "proto/status.h"
+#include "security/channel.h"
 
 namespace weft::client {
 
-Coordinator::Coordinator(const std::string& address)
-    : address_(address), channel_(open_channel(address)) {
+Coordinator::Coordinator(security::Endpoint endpoint)
+    : endpoint_(std::move(endpoint)), channel_(security::open_channel(endpoint_)) {
   jobs_ = v1::JobService::NewStub(channel_);
   workers_ = v1::WorkersService::NewStub(channel_);
   catalogue_ = v1::CatalogueService::NewStub(channel_);
@@ -28,14 +28,14 @@ void Coordinator::check(const grpc::Status& status, const std::string& doing) co
         core::Code::kUnavailable,
         fmt::format("cannot {}: no coordinator answers at {} ({}); start one with 'weft up', or "
                     "name another with --coordinator or WEFT_COORDINATOR",
-                    doing, address_, status.error_message()));
+                    doing, endpoint_.address, status.error_message()));
   }
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED ||
       status.error_code() == grpc::StatusCode::UNKNOWN) {
     throw core::Error(core::Code::kUnavailable,
                       fmt::format("cannot {}: what answers at {} is not a coordinator of this "
                                   "weft ({}); name another with --coordinator",
-                                  doing, address_, status.error_message()));
+                                  doing, endpoint_.address, status.error_message()));
   }
   v1::throw_unless_ok(status, doing);
 }

@@ -10,6 +10,7 @@
 #include <grpcpp/support/status.h>
 
 #include "proto/weft/v1/cluster.grpc.pb.h"
+#include "security/endpoint.h"
 
 namespace weft::client {
 
@@ -18,10 +19,10 @@ inline constexpr std::chrono::seconds kCallDeadline{20};
 // A connection to the coordinator, made when it is first used. Any thread may call.
 class Coordinator {
  public:
-  // `address`: host:port, or unix:/path. Throws core::Error(kInvalidArgument) when it is neither.
-  explicit Coordinator(const std::string& address);
+  // Throws what security::open_channel throws.
+  explicit Coordinator(security::Endpoint endpoint);
 
-  [[nodiscard]] const std::string& address() const { return address_; }
+  [[nodiscard]] const std::string& address() const { return endpoint_.address; }
   [[nodiscard]] v1::JobService::Stub& jobs() { return *jobs_; }
   [[nodiscard]] v1::WorkersService::Stub& workers() { return *workers_; }
   [[nodiscard]] v1::CatalogueService::Stub& catalogue() { return *catalogue_; }
@@ -69,7 +70,7 @@ class Coordinator {
   static constexpr std::chrono::milliseconds kBetweenTries{300};
   [[nodiscard]] static bool is_worth_repeating(const grpc::Status& status);
 
-  std::string address_;
+  security::Endpoint endpoint_;
   std::shared_ptr<grpc::Channel> channel_;  // shared: gRPC's stubs ask for it
   std::unique_ptr<v1::JobService::Stub> jobs_;
   std::unique_ptr<v1::WorkersService::Stub> workers_;

@@ -7,9 +7,7 @@
 #include "coordinator/catalogue_service.h"
 #include "coordinator/job_service.h"
 #include "coordinator/worker_service.h"
-#include "core/error.h"
-#include "proto/address.h"
-#include "proto/limits.h"
+#include "security/server_gate.h"
 
 namespace weft::coordinator {
 
@@ -30,25 +28,14 @@ struct Server::Services {
   BlobService blob;
   JobService job;
   CatalogueService catalogue;
+  std::unique_ptr<security::ServerGate> gate;
   std::unique_ptr<grpc::Server> server;
 };
 
-Server::Server(Scheduler& scheduler, const std::string& listen, bool insecure)
-    : services_(std::make_unique<Services>(scheduler)), address_(listen) {
-  if (!insecure && !v1::is_local_address(listen)) {
-    throw core::Error(core::Code::kPermissionDenied,
-                      listen +
-                          " can be reached from other machines, and calls are neither "
-                          "encrypted nor checked; listen on 127.0.0.1:PORT or unix:PATH, or "
-                          "say --insecure in a network that you trust");
-  }
+Server::Server(Scheduler& scheduler, const security::Endpoint& listen)
+    : services_(std::make_unique<Services>(scheduler)) {
   grpc::ServerBuilder builder;
-  int port = 0;
-  builder.AddListeningPort(listen, grpc::InsecureServerCredentials(), &port);
-  // Two coordinators must not share a port.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
-  builder.SetMaxSendMessageSize(v1::kMessageLimitBytes);
+  services_->gate = std::make_unique<security::ServerGate>(builder, listen);
   grpc::ResourceQuota quota("coordinator");
   quota.SetMaxThreads(kThreadsLimit);
   builder.SetResourceQuota(quota);
@@ -58,15 +45,7 @@ Server::Server(Scheduler& scheduler, const std::string& listen, bool insecure)
   builder.RegisterService(&services_->job);
   builder.RegisterService(&services_->catalogue);
   services_->server = builder.BuildAndStart();
-  if (services_->server == nullptr || port == 0) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot listen on " + listen +
-                          "; is it written HOST:PORT or unix:PATH, and is another coordinator "
-                          "using it?");
-  }
-  if (!listen.starts_with("unix:")) {
-    address_ = listen.substr(0, listen.rfind(':') + 1) + std::to_string(port);
-  }
+  address_ = services_->gate->address();
 }
 
 Server::~Server() { stop(); }

@@ -4,17 +4,17 @@
 #include <string>
 
 #include "coordinator/scheduler.h"
+#include "security/endpoint.h"
 
 namespace weft::coordinator {
 
 // The coordinator's services on one address.
 class Server {
  public:
-  // `listen` is HOST:PORT (port 0: any free one) or unix:PATH. Without `insecure` only a Unix
-  // socket or a loopback address is taken, because nothing on the wire is encrypted and nobody is
-  // asked who they are. Throws core::Error(kPermissionDenied) then, and kUnavailable when the
-  // address cannot be had. `scheduler` must outlive the server.
-  Server(Scheduler& scheduler, const std::string& listen, bool insecure);
+  // `listen` is HOST:PORT (port 0: any free one) or unix:PATH. Throws what security::ServerGate
+  // throws, and core::Error(kUnavailable) when the address cannot be had. `scheduler` must outlive
+  // the server.
+  Server(Scheduler& scheduler, const security::Endpoint& listen);
   // Stops as stop() does.
   ~Server();
   Server(const Server&) = delete;

@@ -26,6 +26,13 @@ inline constexpr std::size_t kLogChunkLimitBytes = std::size_t{64} << 10;
 inline constexpr std::uint64_t kAttemptLogLimitBytes = std::uint64_t{256} << 10;
 inline constexpr int kPiecesLimit = 4096;
 
+// Of connections. Each end asks the other whether it is there when nothing came for a while; a
+// server closes a connection that asks more often than kFastestPingMs.
+inline constexpr int kKeepaliveMs = 20'000;
+inline constexpr int kKeepaliveTimeoutMs = 10'000;
+inline constexpr int kFastestPingMs = 10'000;
+inline constexpr int kStreamsPerConnectionLimit = 1024;
+
 // Of render.proto.
 inline constexpr int kAttachmentsLimit = 20'000;
 inline constexpr std::uint64_t kAttachmentBytesLimit = std::uint64_t{1} << 30;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
 #include <grpc/grpc_security_constants.h>
 #include <grpcpp/security/auth_context.h>
@@ -62,18 +63,21 @@ Caller caller_of(const grpc::ServerContextBase& context) {
   }
 }
 
-Caller check_role(const grpc::ServerContextBase& context, std::string_view call) {
+void check_role(const Caller& caller, std::string_view call) {
   const v1::Role needed = role_needed(call);
-  Caller caller = caller_of(context);
   if (!caller.may(needed)) {
     throw core::Error(core::Code::kPermissionDenied,
-                      std::string(call) + " needs the role " + to_string(needed) +
-                          "; the certificate of '" + caller.user +
-                          "' gives: " + to_string(caller.roles) +
-                          ". Ask whoever keeps the authority for one that does "
-                          "(weft certs issue NAME --role " +
-                          to_string(needed) + ")");
+                      fmt::format("{} needs the role {}; the certificate of '{}' gives: {}. Ask "
+                                  "whoever keeps the authority for one that does (weft certs issue "
+                                  "NAME --role {})",
+                                  call, to_string(needed), caller.user, to_string(caller.roles),
+                                  to_string(needed)));
   }
+}
+
+Caller check_role(const grpc::ServerContextBase& context, std::string_view call) {
+  Caller caller = caller_of(context);
+  check_role(caller, call);
   return caller;
 }
 

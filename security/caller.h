@@ -28,6 +28,10 @@ struct Caller {
 // Throws core::Error(kPermissionDenied) when the certificate is not of weft's making.
 [[nodiscard]] Caller caller_of(const grpc::ServerContextBase& context);
 
+// Throws core::Error(kPermissionDenied) when the caller may not make the call, with the role that
+// is needed and those that it has.
+void check_role(const Caller& caller, std::string_view call);
+
 // The caller, when it may make the call. Throws core::Error(kPermissionDenied) when it may not,
 // with the role that is needed and those that it has.
 Caller check_role(const grpc::ServerContextBase& context, std::string_view call);

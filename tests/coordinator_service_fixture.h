@@ -59,7 +59,7 @@ class ServiceTest : public testing::Test {
     options.commit = fake_commit;
     options.queue.retry_ms = 1;
     scheduler_ = std::make_unique<Scheduler>(std::move(options), core::system_clock());
-    server_ = std::make_unique<Server>(*scheduler_, "127.0.0.1:0", false);
+    server_ = std::make_unique<Server>(*scheduler_, "127.0.0.1:0");
     channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
     jobs_ = v1::JobService::NewStub(channel_);
     blobs_ = v1::BlobService::NewStub(channel_);

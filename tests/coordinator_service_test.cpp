@@ -383,7 +383,7 @@ TEST_F(Service, DamagedBlob_IsNeverServed) {
 TEST_F(Service, AddressesThatOthersReach_AreRefused) {
   for (const char* address : {"0.0.0.0:0", "[::]:0", "192.168.1.1:0", "example.org:0"}) {
     try {
-      const Server server(*scheduler_, address, false);
+      const Server server(*scheduler_, address);
       ADD_FAILURE() << address << " was taken";
     } catch (const core::Error& error) {
       EXPECT_EQ(error.code(), core::Code::kPermissionDenied) << address;

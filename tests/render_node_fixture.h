@@ -140,7 +140,7 @@ class NodeTest : public testing::Test {
   void start() {
     node_.reset();
     node_ = std::make_unique<render::RenderNode>(
-        options_, "unix:" + (folder_ / ("node-" + std::to_string(++nodes_))).string(), false);
+        options_, "unix:" + (folder_ / ("node-" + std::to_string(++nodes_))).string());
   }
   [[nodiscard]] render::NodeClient client() const { return render::NodeClient(node_->address()); }
 

@@ -202,6 +202,40 @@ TEST(AttemptTable, DrainingBeginsNothingAndReportsWhatIsDone) {
   EXPECT_EQ(request.completions(1).results_size(), 0);
 }
 
+TEST(AttemptTable, AnAttemptOfADeadProcessIsReportedWithItsOldTokenButNeverListedAsRunning) {
+  AttemptTable table(2);
+  v1::Completion earlier;
+  earlier.set_job_id("j1");
+  earlier.set_attempt(5);
+  earlier.set_lease_token("old");
+  *earlier.add_results() = result_of(3);
+  const std::shared_ptr<Attempt> attempt = table.take_over(earlier, 2);
+  EXPECT_FALSE(table.claim());
+  EXPECT_EQ(request_of(table).running_size(), 0);
+  EXPECT_EQ(request_of(table).completions_size(), 0) << "two results are on their way";
+  EXPECT_EQ(table.free_attempts(), 2U);
+  EXPECT_FALSE(table.delivered({attempt, 4}, result_of(4)));
+  EXPECT_TRUE(table.given_up({attempt, 5}));
+  ASSERT_EQ(request_of(table).completions_size(), 1);
+  EXPECT_EQ(request_of(table).completions(0).lease_token(), "old");
+  EXPECT_EQ(request_of(table).completions(0).results_size(), 2);
+  EXPECT_TRUE(table.take_forgotten().empty());
+  table.apply(acknowledging(5));
+  EXPECT_EQ(table.take_forgotten().size(), 1U);
+}
+
+TEST(AttemptTable, ARunningAttemptTellsHowFarItIs) {
+  AttemptTable table(1);
+  table.apply(giving(run_of(1, 0, 2)));
+  const auto claim = table.claim();
+  claim->attempt->progress.store(17);
+  claim->attempt->log.add("half way");
+  const v1::SynchronizeRequest request = request_of(table);
+  ASSERT_EQ(request.running_size(), 1);
+  EXPECT_EQ(request.running(0).progress(), 17U);
+  EXPECT_EQ(request.running(0).last_line(), "half way");
+}
+
 TEST(AttemptTable, NeverSendsMoreCompletionsThanTheProtocolAllows) {
   AttemptTable table(1);
   const auto limit = static_cast<std::uint64_t>(v1::kCompletionLimit);

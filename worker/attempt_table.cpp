@@ -54,6 +54,8 @@ void AttemptTable::fill(v1::SynchronizeRequest& request) const {
     running.set_attempt(attempt->assignment.name().attempt());
     running.set_lease_token(attempt->assignment.lease_token());
     running.set_shards_done(attempt->results.size());
+    running.set_progress(attempt->progress.load());
+    running.set_last_line(attempt->log.last_line());
   }
   for (const auto& [name, completion] : completions_) {
     if (request.completions_size() == v1::kCompletionLimit) {
@@ -83,7 +85,10 @@ std::uint32_t AttemptTable::free_attempts() const {
 AttemptTable::Changes AttemptTable::apply(const v1::SynchronizeResponse& response) {
   Changes changes;
   for (const v1::AttemptName& name : response.acknowledged()) {
-    changes.acknowledged += completions_.erase({name.job_id(), name.attempt()});
+    if (completions_.erase({name.job_id(), name.attempt()}) > 0) {
+      ++changes.acknowledged;
+      forgotten_.push_back(name);
+    }
   }
   for (const v1::AttemptName& name : response.stop()) {
     const auto found = std::find_if(attempts_.begin(), attempts_.end(),
@@ -119,6 +124,23 @@ AttemptTable::Changes AttemptTable::apply(const v1::SynchronizeResponse& respons
     }
   }
   return changes;
+}
+
+std::shared_ptr<Attempt> AttemptTable::take_over(const v1::Completion& earlier,
+                                                 std::uint64_t undelivered) {
+  auto attempt = std::make_shared<Attempt>();
+  v1::Assignment& assignment = attempt->assignment;
+  assignment.mutable_name()->set_job_id(earlier.job_id());
+  assignment.mutable_name()->set_attempt(earlier.attempt());
+  assignment.set_lease_token(earlier.lease_token());
+  attempt->results.assign(earlier.results().begin(), earlier.results().end());
+  attempt->begun = undelivered;
+  attempt->in_progress = undelivered;
+  attempt->is_revoked = true;
+  attempt->is_closing = true;
+  attempts_.push_back(attempt);
+  end_if_over(attempt);
+  return attempt;
 }
 
 std::optional<ShardClaim> AttemptTable::claim() {
@@ -171,11 +193,13 @@ bool AttemptTable::end_if_over(const std::shared_ptr<Attempt>& attempt) {
     return false;
   }
   attempts_.erase(found);
+  attempt->is_over.store(true);
   // Of an attempt that is not ours any more only finished shards are of use to anybody.
+  const v1::AttemptName& name = attempt->assignment.name();
   if (attempt->is_revoked && attempt->results.empty()) {
+    forgotten_.push_back(name);
     return true;
   }
-  const v1::AttemptName& name = attempt->assignment.name();
   v1::Completion completion;
   completion.set_job_id(name.job_id());
   completion.set_attempt(name.attempt());

@@ -11,12 +11,13 @@
 
 #include "core/clock.h"
 #include "proto/weft/v1/cluster.pb.h"
+#include "worker/attempt_log.h"
 
 namespace weft::worker {
 
 // A run of shards that the coordinator gave us, and how far we are. Shared between the table and
 // the threads that compute its shards: either may be done with it first. Guarded by the table's
-// owner, but for should_stop.
+// owner, but for the log and what is atomic.
 struct Attempt {
   v1::Assignment assignment;
   std::uint64_t begun = 0;        // shards of the run that were claimed
@@ -29,6 +30,10 @@ struct Attempt {
   bool is_closing = false;    // no further shard is to be begun
   bool is_revoked = false;    // the coordinator does not want it any more
   std::atomic<bool> should_stop{false};
+  std::atomic<bool> is_over{false};  // nothing of it runs any more
+  // Rises whenever a thread that computes a shard of it gets on.
+  std::atomic<std::uint64_t> progress{0};
+  AttemptLog log;
 };
 
 // "job=... attempt=... stage=...": the attempt in a log line.
@@ -61,6 +66,11 @@ class AttemptTable {
   // The next shard, of the attempt that came first; nothing when there is none.
   [[nodiscard]] std::optional<ShardClaim> claim();
 
+  // An attempt of a process that died: `earlier` names it and the results that it had stored with
+  // the coordinator, and for `undelivered` further ones claims of it are about to be delivered. It
+  // is never listed as running, since it owns nothing; what it finished is reported.
+  std::shared_ptr<Attempt> take_over(const v1::Completion& earlier, std::uint64_t undelivered);
+
   // The three ends of a claimed shard. Each says whether the attempt is over: it is then in the
   // completions, or forgotten.
   bool delivered(const ShardClaim& claim, v1::ShardResult result);
@@ -75,6 +85,11 @@ class AttemptTable {
   [[nodiscard]] bool is_empty() const { return attempts_.empty() && completions_.empty(); }
   [[nodiscard]] std::uint64_t unacknowledged() const { return completions_.size(); }
 
+  // Attempts of which nothing is left to say, since the last such call.
+  [[nodiscard]] std::vector<v1::AttemptName> take_forgotten() {
+    return std::exchange(forgotten_, {});
+  }
+
  private:
   using Name = std::pair<std::string, std::uint64_t>;  // job, attempt
 
@@ -85,6 +100,7 @@ class AttemptTable {
   bool is_draining_ = false;
   std::vector<std::shared_ptr<Attempt>> attempts_;  // in the order they came
   std::map<Name, v1::Completion> completions_;
+  std::vector<v1::AttemptName> forgotten_;
 };
 
 }  // namespace weft::worker

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "core/error.h"
 #include "proto/limits.h"
@@ -15,18 +16,48 @@ namespace {
 constexpr std::chrono::seconds kAllowance{30};
 constexpr std::uint64_t kSlowestBytesPerSecond = 1'000'000;
 
-void set_deadline(grpc::ClientContext& context, std::uint64_t size_bytes) {
-  const auto allowance = kAllowance + std::chrono::seconds(size_bytes / kSlowestBytesPerSecond);
-  context.set_deadline(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
-                                    gpr_time_from_seconds(allowance.count(), GPR_TIMESPAN)));
-}
-
 bool is_away(const grpc::Status& status) {
   return status.error_code() == grpc::StatusCode::UNAVAILABLE ||
          status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
 }
 
 }  // namespace
+
+// One call, with a deadline for a slow line, that close() breaks off.
+class BlobClient::Call {
+ public:
+  Call(BlobClient& client, std::uint64_t size_bytes) : client_(client) {
+    const auto allowance = kAllowance + std::chrono::seconds(size_bytes / kSlowestBytesPerSecond);
+    context_.set_deadline(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
+                                       gpr_time_from_seconds(allowance.count(), GPR_TIMESPAN)));
+    const std::lock_guard lock(client_.mutex_);
+    client_.running_.insert(&context_);
+    if (client_.is_closed_) {
+      context_.TryCancel();
+    }
+  }
+  ~Call() {
+    const std::lock_guard lock(client_.mutex_);
+    client_.running_.erase(&context_);
+  }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+  Call(Call&&) = delete;
+  Call& operator=(Call&&) = delete;
+  [[nodiscard]] grpc::ClientContext& context() { return context_; }
+
+ private:
+  BlobClient& client_;
+  grpc::ClientContext context_;
+};
+
+void BlobClient::close() {
+  const std::lock_guard lock(mutex_);
+  is_closed_ = true;
+  for (grpc::ClientContext* const context : running_) {
+    context->TryCancel();
+  }
+}
 
 BlobClient::BlobClient(const std::shared_ptr<grpc::Channel>& channel)
     : stub_(v1::BlobService::NewStub(channel)) {}
@@ -38,15 +69,14 @@ std::string BlobClient::read(const core::Digest& digest, const std::function<boo
     v1::ReadRequest request;
     request.set_digest(digest.binary());
     request.set_offset(data.size());
-    grpc::ClientContext context;
-    set_deadline(context, v1::kBlobLimitBytes);
-    const auto reader = stub_->Read(&context, request);
+    Call call(*this, v1::kBlobLimitBytes);
+    const auto reader = stub_->Read(&call.context(), request);
     v1::ReadResponse response;
     while (reader->Read(&response)) {
       data += response.data();
       back_off.reset();
       if (data.size() > v1::kBlobLimitBytes || should_stop()) {
-        context.TryCancel();
+        call.context().TryCancel();
       }
     }
     const grpc::Status status = reader->Finish();
@@ -68,39 +98,66 @@ std::string BlobClient::read(const core::Digest& digest, const std::function<boo
   return data;
 }
 
+// How much of the blob the coordinator has kept of a broken upload; nothing when it has all.
+std::optional<std::uint64_t> BlobClient::committed(const core::Digest& digest) {
+  Call call(*this, 0);
+  v1::QueryWriteRequest request;
+  request.set_digest(digest.binary());
+  v1::QueryWriteResponse response;
+  const grpc::Status status = stub_->QueryWrite(&call.context(), request, &response);
+  if (!status.ok()) {
+    return 0;  // the upload itself will tell what is wrong
+  }
+  return response.complete() ? std::nullopt : std::optional(response.committed_bytes());
+}
+
+grpc::Status BlobClient::send(const core::Digest& digest, std::string_view data,
+                              std::uint64_t offset) {
+  Call call(*this, data.size());
+  v1::WriteResponse response;
+  const auto writer = stub_->Write(&call.context(), &response);
+  v1::WriteRequest request;
+  request.set_digest(digest.binary());
+  request.set_size_bytes(data.size());
+  request.set_offset(offset);
+  std::size_t sent = offset;
+  do {
+    const std::size_t size = std::min(v1::kChunkLimitBytes, data.size() - sent);
+    request.set_data(std::string(data.substr(sent, size)));
+    sent += size;
+    if (!writer->Write(request)) {
+      break;  // the answer is there already, good or bad
+    }
+    request.Clear();
+  } while (sent < data.size());
+  writer->WritesDone();
+  return writer->Finish();
+}
+
 void BlobClient::write(const core::Digest& digest, std::string_view data,
                        const std::function<bool()>& should_stop) {
   BackOff back_off;
+  std::uint64_t offset = 0;
   while (true) {
-    grpc::ClientContext context;
-    set_deadline(context, data.size());
-    v1::WriteResponse response;
-    const auto writer = stub_->Write(&context, &response);
-    v1::WriteRequest request;
-    request.set_digest(digest.binary());
-    request.set_size_bytes(data.size());
-    std::size_t sent = 0;
-    do {
-      const std::size_t size = std::min(v1::kChunkLimitBytes, data.size() - sent);
-      request.set_data(std::string(data.substr(sent, size)));
-      sent += size;
-      if (!writer->Write(request)) {
-        break;  // the answer is there already, good or bad
-      }
-      request.Clear();
-    } while (sent < data.size());
-    writer->WritesDone();
-    const grpc::Status status = writer->Finish();
+    const grpc::Status status = send(digest, data, offset);
     if (status.ok()) {
       return;
     }
     if (should_stop()) {
       throw core::Error(core::Code::kCancelled, "stopped while writing a blob");
     }
-    if (!is_away(status)) {
+    // Somebody else uploads it, or the coordinator has kept less of it than it said.
+    const bool is_elsewhere = status.error_code() == grpc::StatusCode::ABORTED ||
+                              status.error_code() == grpc::StatusCode::OUT_OF_RANGE;
+    if (!is_away(status) && !is_elsewhere) {
       v1::throw_unless_ok(status, "write blob " + digest.hex());
     }
     back_off.wait(should_stop);
+    const std::optional<std::uint64_t> kept = committed(digest);
+    if (!kept) {
+      return;
+    }
+    offset = *kept <= data.size() ? *kept : 0;
   }
 }
 

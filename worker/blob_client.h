@@ -2,10 +2,14 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
 #include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
 
 #include "core/digest.h"
 #include "proto/weft/v1/cluster.grpc.pb.h"
@@ -24,13 +28,25 @@ class BlobClient {
   [[nodiscard]] std::string read(const core::Digest& digest,
                                  const std::function<bool()>& should_stop);
 
-  // Stores the blob with the coordinator. Throws core::Error(kResourceExhausted) when it is too
-  // large or the coordinator's disk is full.
+  // Stores the blob with the coordinator; goes on where a broken upload ended. Throws
+  // core::Error(kResourceExhausted) when it is too large or the coordinator's disk is full.
   void write(const core::Digest& digest, std::string_view data,
              const std::function<bool()>& should_stop);
 
+  // Breaks off the calls that run, for a process that ends.
+  void close();
+
  private:
+  class Call;
+
+  [[nodiscard]] std::optional<std::uint64_t> committed(const core::Digest& digest);
+  [[nodiscard]] grpc::Status send(const core::Digest& digest, std::string_view data,
+                                  std::uint64_t offset);
+
   std::unique_ptr<v1::BlobService::Stub> stub_;
+  std::mutex mutex_;
+  std::set<grpc::ClientContext*> running_;
+  bool is_closed_ = false;
 };
 
 }  // namespace weft::worker

@@ -3,11 +3,11 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "core/error.h"
 #include "proto/limits.h"
-#include "worker/baker.h"
 #include "worker/lease_loop.h"
 
 // The worker's threads that compute shards and store their results.
@@ -18,128 +18,209 @@ namespace {
 
 std::uint64_t whole_ms(double seconds) { return static_cast<std::uint64_t>(seconds * 1000 + 0.5); }
 
+v1::ErrorKind kind_of(const core::Error& error) {
+  // Inputs that cannot be had are a shortage, not a fault of the task.
+  const bool is_short = error.code() == core::Code::kUnavailable ||
+                        error.code() == core::Code::kResourceExhausted ||
+                        error.code() == core::Code::kNotFound;
+  return is_short ? v1::ERROR_KIND_RESOURCE_SHORT : v1::ERROR_KIND_TASK_FAILED;
+}
+
+const char* name_of(v1::ErrorKind kind) {
+  return kind == v1::ERROR_KIND_RESOURCE_SHORT ? "resource_short" : "task_failed";
+}
+
 }  // namespace
 
-void LeaseLoop::compute() {
-  while (true) {
-    std::optional<ShardClaim> claim;
-    bool has_room = false;
-    {
-      std::unique_lock lock(mutex_);
-      while (!is_leaving_.load() && !(claim = table_.claim())) {
-        changed_.wait(lock);
-      }
-      if (!claim) {
-        return;
-      }
-      if (!claim->attempt->since_first_shard) {
-        claim->attempt->since_first_shard.emplace();
-      }
-      has_room = table_.free_attempts() > free_told_;
-    }
-    if (has_room) {
-      tell_news();
-    }
-    bake(*claim);
+void LeaseLoop::compute(Seat& seat) {
+  while (const std::optional<ShardClaim> claim = next_claim(seat)) {
+    bake(seat, *claim);
   }
 }
 
-void LeaseLoop::bake(const ShardClaim& claim) {
+std::optional<ShardClaim> LeaseLoop::next_claim(Seat& seat) {
+  std::optional<ShardClaim> claim;
+  bool has_room = false;
+  {
+    std::unique_lock lock(mutex_);
+    while (!is_leaving_.load() && !(claim = table_.claim())) {
+      changed_.wait(lock);
+    }
+    if (!claim) {
+      return std::nullopt;
+    }
+    if (!claim->attempt->since_first_shard) {
+      claim->attempt->since_first_shard.emplace();
+    }
+    seat.claim = claim;
+    has_room = table_.free_attempts() > free_told_;
+  }
+  if (has_room) {
+    tell_news();
+  }
+  return claim;
+}
+
+// Puts down what the seat has in hand; false when that was taken away meanwhile.
+bool LeaseLoop::leave(Seat& seat) {
+  const std::lock_guard lock(mutex_);
+  const bool was_given_up = seat.is_given_up;
+  if (was_given_up) {
+    --stuck_;
+    spdlog::warn("worker={} {} shard={} state=returned: a thread that hung is back", id_,
+                 log_name(*seat.claim->attempt), seat.claim->shard);
+  }
+  seat = Seat();
+  return !was_given_up;
+}
+
+void LeaseLoop::bake(Seat& seat, const ShardClaim& claim) {
   Attempt& attempt = *claim.attempt;
-  const v1::Assignment& assignment = attempt.assignment;
   const auto should_stop = [&attempt, this] {
+    attempt.progress.fetch_add(1);
     return attempt.should_stop.load() || is_giving_up_.load();
   };
+  Baked result;
+  std::optional<v1::ErrorKind> error;
+  std::string message;
+  bool is_cancelled = false;
   try {
-    const StageBakers::Prepared prepared = bakers_.of(assignment, should_stop);
-    std::string shard_input;
-    if (!assignment.shard_inputs().empty()) {
-      const auto index = static_cast<int>(claim.shard - assignment.first_shard());
-      shard_input =
-          blobs_.read(*core::Digest::from_binary(assignment.shard_inputs(index)), should_stop);
-    }
-    std::string result = prepared.baker->bake(claim.shard, shard_input, should_stop);
-    {
-      const std::lock_guard lock(mutex_);
-      attempt.prepare_ms += whole_ms(prepared.prepare_seconds);
-      const std::uint64_t wall_ms = whole_ms(attempt.since_first_shard->seconds());
-      attempt.work_ms = wall_ms - std::min(wall_ms, attempt.prepare_ms);
-    }
-    const core::Digest digest = core::digest_of(result);
-    if (outbox_.push({claim, digest, std::move(result)})) {
-      return;
-    }
-  } catch (const core::Error& error) {
-    if (error.code() != core::Code::kCancelled) {
-      // Inputs that cannot be had are a shortage, not a fault of the task.
-      const bool is_short = error.code() == core::Code::kUnavailable ||
-                            error.code() == core::Code::kResourceExhausted ||
-                            error.code() == core::Code::kNotFound;
-      fail(claim, is_short ? v1::ERROR_KIND_RESOURCE_SHORT : v1::ERROR_KIND_TASK_FAILED,
-           error.what());
-      return;
-    }
+    result = baked(claim, should_stop);
+  } catch (const core::Error& e) {
+    is_cancelled = e.code() == core::Code::kCancelled;
+    error = kind_of(e);
+    message = e.what();
   } catch (const std::bad_alloc&) {
-    fail(claim, v1::ERROR_KIND_RESOURCE_SHORT, "out of memory");
-    return;
-  } catch (const std::exception& error) {
-    fail(claim, v1::ERROR_KIND_TASK_FAILED, error.what());
+    error = v1::ERROR_KIND_RESOURCE_SHORT;
+    message = "out of memory";
+  } catch (const std::exception& e) {
+    error = v1::ERROR_KIND_TASK_FAILED;
+    message = e.what();
+  }
+  if (!leave(seat)) {
     return;
   }
+  if (is_cancelled) {
+    give_up(claim);
+  } else if (error) {
+    fail(claim, *error, message);
+  } else {
+    store(claim, result, should_stop);
+  }
+}
+
+LeaseLoop::Baked LeaseLoop::baked(const ShardClaim& claim,
+                                  const std::function<bool()>& should_stop) {
+  Attempt& attempt = *claim.attempt;
+  const v1::Assignment& assignment = attempt.assignment;
+  const StageBakers::Prepared prepared = bakers_.of(assignment, should_stop);
+  if (prepared.prepare_seconds > 0) {
+    attempt.log.add(fmt::format("stage prepared in {:.2f} s", prepared.prepare_seconds));
+  }
+  std::string shard_input;
+  if (!assignment.shard_inputs().empty()) {
+    const auto index = static_cast<int>(claim.shard - assignment.first_shard());
+    shard_input =
+        blobs_.read(*core::Digest::from_binary(assignment.shard_inputs(index)), should_stop);
+  }
+  const core::Stopwatch since_start;
+  Baked baked;
+  baked.bytes = prepared.baker->bake(claim.shard, shard_input, should_stop);
+  baked.seconds = since_start.seconds();
   const std::lock_guard lock(mutex_);
-  table_.given_up(claim);
-  changed_.notify_all();
+  attempt.prepare_ms += whole_ms(prepared.prepare_seconds);
+  const std::uint64_t wall_ms = whole_ms(attempt.since_first_shard->seconds());
+  attempt.work_ms = wall_ms - std::min(wall_ms, attempt.prepare_ms);
+  return baked;
+}
+
+void LeaseLoop::store(const ShardClaim& claim, const Baked& baked,
+                      const std::function<bool()>& should_stop) {
+  const core::Digest digest = core::digest_of(baked.bytes);
+  spdlog::debug("worker={} job={} attempt={} shard={} digest={} seconds={:.3f} state=computed", id_,
+                claim.attempt->assignment.name().job_id(),
+                claim.attempt->assignment.name().attempt(), claim.shard, digest.hex(),
+                baked.seconds);
+  claim.attempt->log.add_sometimes(fmt::format("shard {} computed in {:.3f} s, {} bytes",
+                                               claim.shard, baked.seconds, baked.bytes.size()));
+  try {
+    if (!spool_.put(claim, digest, baked.bytes, should_stop)) {
+      give_up(claim);
+    }
+  } catch (const core::Error& error) {
+    fail(claim, kind_of(error), error.what());
+  }
+}
+
+void LeaseLoop::give_up(const ShardClaim& claim) {
+  {
+    const std::lock_guard lock(mutex_);
+    table_.given_up(claim);
+    changed_.notify_all();
+  }
+  if (!is_giving_up_.load()) {
+    forget_what_is_over();
+  }
 }
 
 void LeaseLoop::fail(const ShardClaim& claim, v1::ErrorKind kind, const std::string& message) {
   spdlog::error("worker={} {} shard={} state=failed kind={} error=\"{}\"", id_,
-                log_name(*claim.attempt), claim.shard,
-                kind == v1::ERROR_KIND_RESOURCE_SHORT ? "resource_short" : "task_failed", message);
+                log_name(*claim.attempt), claim.shard, name_of(kind), message);
+  claim.attempt->log.add_important(
+      fmt::format("error: shard {}: {}: {}", claim.shard, name_of(kind), message));
   v1::TaskError error;
   error.set_kind(kind);
   error.set_shard(claim.shard);
-  error.set_message(message.substr(0, v1::kErrorTextLimitBytes));
+  error.set_message(std::string(beginning_of(printable(message), v1::kErrorTextLimitBytes)));
   bool is_over = false;
   {
     const std::lock_guard lock(mutex_);
     is_over = table_.failed(claim, std::move(error));
   }
   if (is_over) {
+    logs_.hurry();
     tell_news();
+    forget_what_is_over();
   }
 }
 
 void LeaseLoop::upload() {
-  while (const std::optional<OutboxItem> item = outbox_.pop()) {
+  while (const std::optional<SpoolItem> item = spool_.next()) {
     upload(*item);
   }
 }
 
-void LeaseLoop::upload(const OutboxItem& item) {
+void LeaseLoop::upload(const SpoolItem& item) {
   try {
-    blobs_.write(item.digest, item.bytes, [this] { return is_giving_up_.load(); });
+    blobs_.write(item.result.digest, Spool::read(item), [this] { return is_giving_up_.load(); });
   } catch (const core::Error& error) {
     if (error.code() == core::Code::kCancelled) {
-      const std::lock_guard lock(mutex_);
-      table_.given_up(item.claim);
+      spool_.kept(item);
     } else {
+      spool_.dropped(item);
       fail(item.claim, v1::ERROR_KIND_RESOURCE_SHORT, error.what());
     }
     return;
   }
+  spool_.uploaded(item);
   v1::ShardResult result;
   result.set_shard(item.claim.shard);
-  result.set_digest(item.digest.binary());
-  result.set_size_bytes(item.bytes.size());
+  result.set_digest(item.result.digest.binary());
+  result.set_size_bytes(item.result.size_bytes);
   bool is_over = false;
   {
     const std::lock_guard lock(mutex_);
     is_over = table_.delivered(item.claim, std::move(result));
   }
   if (is_over) {
-    const Attempt& attempt = *item.claim.attempt;
+    Attempt& attempt = *item.claim.attempt;
     spdlog::info("worker={} {} results={} prepare_ms={} work_ms={} state=completed", id_,
                  log_name(attempt), attempt.results.size(), attempt.prepare_ms, attempt.work_ms);
+    attempt.log.add(fmt::format("ended: {} of {} shards in {:.3f} s, of which {:.3f} s preparing",
+                                attempt.results.size(), attempt.assignment.shards(),
+                                1e-3 * static_cast<double>(attempt.work_ms + attempt.prepare_ms),
+                                1e-3 * static_cast<double>(attempt.prepare_ms)));
+    logs_.hurry();
     tell_news();
   }
 }

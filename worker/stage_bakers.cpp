@@ -27,7 +27,8 @@ core::Digest stage_of(const v1::Assignment& assignment) {
 
 }  // namespace
 
-std::shared_ptr<StageBakers::Slot> StageBakers::slot_of(const core::Digest& stage) {
+std::shared_ptr<StageBakers::Slot> StageBakers::slot_of(const v1::Assignment& assignment) {
+  const core::Digest stage = stage_of(assignment);
   const std::lock_guard lock(mutex_);
   const auto found = std::find_if(slots_.begin(), slots_.end(),
                                   [&](const auto& slot) { return slot->stage == stage; });
@@ -37,6 +38,9 @@ std::shared_ptr<StageBakers::Slot> StageBakers::slot_of(const core::Digest& stag
   }
   auto slot = std::make_shared<Slot>();
   slot->stage = stage;
+  if (!assignment.inputs().empty()) {
+    slot->scene = core::Digest::from_binary(assignment.inputs(0));
+  }
   slots_.push_front(slot);
   if (slots_.size() > kSlots) {
     slots_.pop_back();
@@ -46,7 +50,7 @@ std::shared_ptr<StageBakers::Slot> StageBakers::slot_of(const core::Digest& stag
 
 StageBakers::Prepared StageBakers::of(const v1::Assignment& assignment,
                                       const std::function<bool()>& should_stop) {
-  const std::shared_ptr<Slot> slot = slot_of(stage_of(assignment));
+  const std::shared_ptr<Slot> slot = slot_of(assignment);
   const std::lock_guard lock(slot->mutex);
   if (slot->baker) {
     return {slot->baker, 0};
@@ -63,8 +67,22 @@ StageBakers::Prepared StageBakers::of(const v1::Assignment& assignment,
     }
     context.inputs.push_back(inputs_.read(*digest, should_stop));
   }
-  slot->baker = make_baker(std::move(context));
+  slot->baker = maker_(std::move(context));
+  slot->is_ready.store(true);
   return {slot->baker, since_start.seconds()};
+}
+
+std::vector<core::Digest> StageBakers::scenes() {
+  std::vector<core::Digest> scenes;
+  const std::lock_guard lock(mutex_);
+  for (const auto& slot : slots_) {
+    const bool is_new = slot->scene && slot->is_ready.load() &&
+                        std::find(scenes.begin(), scenes.end(), *slot->scene) == scenes.end();
+    if (is_new) {
+      scenes.push_back(*slot->scene);
+    }
+  }
+  return scenes;
 }
 
 }  // namespace weft::worker

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/digest.h"
 #include "proto/weft/v1/cluster.pb.h"
@@ -18,7 +22,9 @@ namespace weft::worker {
 // that prepares it, others do not.
 class StageBakers {
  public:
-  explicit StageBakers(InputCache& inputs) : inputs_(inputs) {}
+  using Maker = std::function<std::unique_ptr<Baker>(BakerContext)>;  // make_baker's type
+
+  StageBakers(InputCache& inputs, Maker maker) : inputs_(inputs), maker_(std::move(maker)) {}
 
   struct Prepared {
     std::shared_ptr<const Baker> baker;  // shared: the cache may drop it while shards still run
@@ -28,16 +34,22 @@ class StageBakers {
   [[nodiscard]] Prepared of(const v1::Assignment& assignment,
                             const std::function<bool()>& should_stop);
 
+  // The first inputs (tiles, where a stage has a scene) of the stages that are held.
+  [[nodiscard]] std::vector<core::Digest> scenes();
+
  private:
   struct Slot {
     core::Digest stage;
+    std::optional<core::Digest> scene;
+    std::atomic<bool> is_ready{false};
     std::mutex mutex;
     std::shared_ptr<const Baker> baker;
   };
 
-  [[nodiscard]] std::shared_ptr<Slot> slot_of(const core::Digest& stage);
+  [[nodiscard]] std::shared_ptr<Slot> slot_of(const v1::Assignment& assignment);
 
   InputCache& inputs_;
+  const Maker maker_;
   std::mutex mutex_;
   std::list<std::shared_ptr<Slot>> slots_;  // the one used last first
 };

@@ -13,18 +13,19 @@
 #include "coordinator/server.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "security/endpoint_options.h"
 
 namespace {
 
 namespace coordinator = weft::coordinator;
 namespace core = weft::core;
+namespace security = weft::security;
 
 struct Options {
-  std::string listen = "127.0.0.1:7411";
+  security::Endpoint listen = "127.0.0.1:7411";
   std::string state;
   std::string log_level = "info";
   std::uint32_t lease_seconds = 30;
-  bool insecure = false;
 };
 
 // Blocks SIGTERM and SIGINT in this thread and all that it starts; they are waited for.
@@ -44,7 +45,7 @@ int serve(const Options& options) {
   scheduler_options.queue.lease_ms = options.lease_seconds * 1000;
   scheduler_options.commit = coordinator::commit;
   coordinator::Scheduler scheduler(std::move(scheduler_options), core::system_clock());
-  coordinator::Server server(scheduler, options.listen, options.insecure);
+  coordinator::Server server(scheduler, options.listen);
   std::printf("weft-coordinator ready at %s\n", server.address().c_str());
   std::fflush(stdout);
 
@@ -73,15 +74,14 @@ int main(int argc, char** argv) {
       "weft-coordinator splits the precomputation of fabrics into tasks for weft-worker processes "
       "and keeps the versions of the databases that come of it."};
   app.name("weft-coordinator");
-  app.add_option("--listen", options.listen,
+  app.add_option("--listen", options.listen.address,
                  "HOST:PORT (port 0: any free one) or unix:PATH; printed when ready")
       ->capture_default_str();
   app.add_option("--state", options.state,
                  "folder of everything that must not be lost; made when absent, used by one "
                  "coordinator at a time")
       ->required();
-  app.add_flag("--insecure", options.insecure,
-               "allow an address that other machines reach, though nothing is encrypted");
+  weft::security::add_security_options(app, options.listen);
   app.add_option("--lease", options.lease_seconds,
                  "seconds of silence after which a worker's shards go to another")
       ->check(CLI::Range(2U, 3600U))

@@ -14,20 +14,21 @@
 #include "core/error.h"
 #include "proto/address.h"
 #include "render/node/render_node.h"
+#include "security/endpoint_options.h"
 
 namespace {
 
 namespace core = weft::core;
 namespace render = weft::render;
+namespace security = weft::security;
 
 struct Options {
   render::RenderNodeOptions node;
-  std::string listen = "127.0.0.1:7412";
+  security::Endpoint listen = "127.0.0.1:7412";
   std::string log_level = "info";
   double cache_gib = 16;
   double memory_gib = 0;
   double drain_seconds = 60;
-  bool insecure = false;
 };
 
 constexpr double kGib = 1024.0 * 1024 * 1024;
@@ -62,7 +63,9 @@ int serve(Options options) {
   const sigset_t signals = block_signals();
   options.node.cache_limit_bytes = static_cast<std::uint64_t>(options.cache_gib * kGib);
   options.node.memory_limit_bytes = static_cast<std::uint64_t>(options.memory_gib * kGib);
-  render::RenderNode node(options.node, options.listen, options.insecure);
+  options.node.coordinator.tls_folder = options.listen.tls_folder;
+  options.node.coordinator.insecure = options.listen.insecure;
+  render::RenderNode node(options.node, options.listen);
   std::printf("weft-render ready at %s\n", node.address().c_str());
   std::fflush(stdout);
   int signal = 0;
@@ -79,12 +82,11 @@ int serve(Options options) {
 }
 
 void add_options(CLI::App& app, Options& options) {
-  app.add_option("--listen", options.listen,
+  app.add_option("--listen", options.listen.address,
                  "HOST:PORT (port 0: any free one) or unix:PATH; printed when ready")
       ->capture_default_str();
-  app.add_flag("--insecure", options.insecure,
-               "allow an address that other machines reach, though nothing is encrypted");
-  app.add_option("--coordinator", options.node.coordinator,
+  security::add_security_options(app, options.listen);
+  app.add_option("--coordinator", options.node.coordinator.address,
                  "where fabrics come from: host:port or unix:/path")
       ->envname("WEFT_COORDINATOR")
       ->check(CLI::Validator(weft::v1::mistake_in_address, "", "address"))

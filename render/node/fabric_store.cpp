@@ -39,7 +39,7 @@ std::uint64_t fabric_memory_bytes(const std::filesystem::path& database) {
   return bytes;
 }
 
-FabricStore::FabricStore(std::string coordinator, client::FabricCache cache,
+FabricStore::FabricStore(const security::Endpoint& coordinator, client::FabricCache cache,
                          std::uint64_t memory_limit_bytes)
     : coordinator_(coordinator),
       cache_(std::move(cache)),

@@ -10,6 +10,7 @@
 
 #include "client/fabric_cache.h"
 #include "render/load_fabric.h"
+#include "security/endpoint.h"
 
 namespace weft::render {
 
@@ -22,8 +23,9 @@ namespace weft::render {
 // asks (resident, resident_bytes), any thread.
 class FabricStore {
  public:
-  // `coordinator`: its address. `memory_limit_bytes`: of fabrics and pictures together.
-  FabricStore(std::string coordinator, client::FabricCache cache, std::uint64_t memory_limit_bytes);
+  // `memory_limit_bytes`: of fabrics and pictures together.
+  FabricStore(const security::Endpoint& coordinator, client::FabricCache cache,
+              std::uint64_t memory_limit_bytes);
 
   // Frees what is not needed so that `bytes` and the fabrics fit the limit. Throws
   // core::Error(kResourceExhausted) with the figures when the bytes alone exceed it.

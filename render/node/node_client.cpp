@@ -9,7 +9,6 @@
 
 #include <grpcpp/client_context.h>
 
-#include "client/channel.h"
 #include "client/coordinator.h"
 #include "core/digest.h"
 #include "core/error.h"
@@ -17,13 +16,13 @@
 #include "proto/status.h"
 #include "render/animation.h"
 #include "render/node/drawing_message.h"
+#include "security/channel.h"
 
 namespace weft::render {
 namespace {
 
 using Stream = grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>;
 
-constexpr int kKeepaliveMs = 30'000;
 constexpr std::chrono::milliseconds kBetweenQuestions{50};
 
 // Ends the call when it is time to stop, however long a read takes.
@@ -156,17 +155,18 @@ class NodeClient::Reception {
   std::size_t frames_finished_ = 0;
 };
 
-NodeClient::NodeClient(const std::string& address)
-    : address_(address), channel_(client::open_channel(address, kKeepaliveMs)) {
+NodeClient::NodeClient(security::Endpoint endpoint)
+    : endpoint_(std::move(endpoint)), channel_(security::open_channel(endpoint_)) {
   stub_ = v1::RenderService::NewStub(channel_);
 }
 
 std::string NodeClient::explained(const grpc::Status& status) const {
   if (channel_->GetState(false) == GRPC_CHANNEL_READY &&
       status.error_code() == grpc::StatusCode::UNAVAILABLE) {
-    return "the render node at " + address_ + " cannot draw now: " + status.error_message();
+    return "the render node at " + endpoint_.address +
+           " cannot draw now: " + status.error_message();
   }
-  return "no render node answers at " + address_ + " (" + status.error_message() +
+  return "no render node answers at " + endpoint_.address + " (" + status.error_message() +
          "); start one with 'weft-render', or name another with --node";
 }
 
@@ -214,7 +214,7 @@ void NodeClient::draw_pictures(const v1::Scene& scene, bool progressive, const F
       status.error_code() == grpc::StatusCode::UNIMPLEMENTED) {
     throw core::Error(core::Code::kUnavailable, explained(status));
   }
-  v1::throw_unless_ok(status, "draw on " + address_);
+  v1::throw_unless_ok(status, "draw on " + endpoint_.address);
   if (reception.frames_finished() != frame_numbers(scene).size()) {
     throw core::Error(core::Code::kDataLoss, "the node ended before all pictures had come");
   }

@@ -9,6 +9,7 @@
 
 #include "proto/weft/v1/render.grpc.pb.h"
 #include "render/draw_pictures.h"
+#include "security/endpoint.h"
 
 namespace weft::render {
 
@@ -21,8 +22,8 @@ struct NodeReports {
 // A connection to a render node, made when it is first used. One thread.
 class NodeClient {
  public:
-  // `address`: host:port, or unix:/path. Throws core::Error(kInvalidArgument) when it is neither.
-  explicit NodeClient(const std::string& address);
+  // Throws what security::open_channel throws.
+  explicit NodeClient(security::Endpoint endpoint);
 
   // draw_pictures, but on the node: the same calls of `sink`, the same pictures. The files that the
   // scene names are read by `files` and sent along; what sink.start returns is not asked. Throws
@@ -42,7 +43,7 @@ class NodeClient {
   class Reception;
   [[nodiscard]] std::string explained(const grpc::Status& status) const;
 
-  std::string address_;
+  security::Endpoint endpoint_;
   std::shared_ptr<grpc::Channel> channel_;  // shared: gRPC's stub asks for it
   std::unique_ptr<v1::RenderService::Stub> stub_;
   std::map<std::string, v1::RenderedFabric> fabrics_;

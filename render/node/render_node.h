@@ -6,6 +6,7 @@
 #include <string>
 
 #include "render/node/render_service.h"
+#include "security/server_gate.h"
 
 namespace weft::render {
 
@@ -13,11 +14,9 @@ namespace weft::render {
 // address.
 class RenderNode {
  public:
-  // `listen` is HOST:PORT (port 0: any free one) or unix:PATH. Without `insecure` only a Unix
-  // socket or a loopback address is taken, because nothing on the wire is encrypted and nobody is
-  // asked who they are. Throws core::Error(kPermissionDenied) then, and kUnavailable when the
-  // address cannot be had.
-  RenderNode(const RenderNodeOptions& options, const std::string& listen, bool insecure);
+  // `listen` is HOST:PORT (port 0: any free one) or unix:PATH. Throws what security::ServerGate
+  // throws, and core::Error(kUnavailable) when the address cannot be had.
+  RenderNode(const RenderNodeOptions& options, const security::Endpoint& listen);
   // Ends what is being drawn.
   ~RenderNode();
   RenderNode(const RenderNode&) = delete;
@@ -34,6 +33,7 @@ class RenderNode {
 
  private:
   RenderService service_;
+  std::unique_ptr<security::ServerGate> gate_;
   std::unique_ptr<grpc::Server> server_;
   std::string address_;
 };

@@ -17,6 +17,7 @@
 #include "render/node/drawing_message.h"
 #include "render/node/io_guard.h"
 #include "render/node/outbox.h"
+#include "security/caller.h"
 
 namespace weft::render {
 namespace {
@@ -187,6 +188,7 @@ grpc::Status RenderService::Render(grpc::ServerContext* context, Stream* stream)
   Conversation conversation(*context, *stream);
   grpc::Status status = grpc::Status::OK;
   try {
+    static_cast<void>(security::check_role(*context, "RenderService.Render"));
     if (!conversation.read(first) || !first.has_order()) {
       throw core::Error(core::Code::kInvalidArgument, "the stream does not begin with an order");
     }
@@ -213,9 +215,14 @@ grpc::Status RenderService::Render(grpc::ServerContext* context, Stream* stream)
   return status;
 }
 
-grpc::Status RenderService::GetNode(grpc::ServerContext* /*context*/,
+grpc::Status RenderService::GetNode(grpc::ServerContext* context,
                                     const v1::GetNodeRequest* /*request*/,
                                     v1::GetNodeResponse* response) {
+  try {
+    static_cast<void>(security::check_role(*context, "RenderService.GetNode"));
+  } catch (const core::Error& error) {
+    return v1::to_status(error);
+  }
   response->set_software("weft 0.1.0");
   response->set_draining(queue_.closed());
   response->set_orders(queue_.size());

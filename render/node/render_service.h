@@ -10,11 +10,12 @@
 #include "render/gpu/device_renderer.h"
 #include "render/node/fabric_store.h"
 #include "render/node/render_queue.h"
+#include "security/endpoint.h"
 
 namespace weft::render {
 
 struct RenderNodeOptions {
-  std::string coordinator;      // its address
+  security::Endpoint coordinator;
   std::filesystem::path cache;  // folder of fetched fabrics and fitted environments
   std::uint64_t cache_limit_bytes = std::uint64_t{16} << 30;
   std::uint64_t memory_limit_bytes = std::uint64_t{4} << 30;

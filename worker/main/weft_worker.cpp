@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -7,8 +8,6 @@
 #include <thread>
 
 #include <CLI/CLI.hpp>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -17,11 +16,14 @@
 #include "core/interrupt.h"
 #include "proto/address.h"
 #include "proto/limits.h"
+#include "security/channel.h"
+#include "security/endpoint_options.h"
 #include "worker/lease_loop.h"
 
 namespace {
 
 constexpr unsigned kMiB = 1U << 20U;
+constexpr int kLongestReconnectMs = 2000;
 
 std::string host_name() {
   std::string name(256, '\0');
@@ -44,8 +46,16 @@ std::string default_scratch() {
              : (std::filesystem::temp_directory_path() / "weft-worker").string();
 }
 
+std::string mistake_in_label(const std::string& label) {
+  const bool is_good = !label.empty() && label.size() <= weft::v1::kIdLimit &&
+                       label.find_first_not_of(
+                           "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwx"
+                           "yz0123456789_.=-") == std::string::npos;
+  return is_good ? std::string() : "a label is 1 to 64 characters of A-Z, a-z, 0-9, _, ., = and -";
+}
+
 struct Flags {
-  std::string coordinator = "127.0.0.1:7411";
+  weft::security::Endpoint coordinator = "127.0.0.1:7411";
   std::string log_level = "info";
   std::uint64_t scratch_limit_mib = 4096;
   weft::worker::WorkerOptions worker;
@@ -57,10 +67,11 @@ void declare(CLI::App& app, Flags& flags) {
   flags.worker.scratch = default_scratch();
   flags.worker.memory_bytes = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
                               static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-  app.add_option("--coordinator", flags.coordinator, "Address: host:port or unix:/path")
+  app.add_option("--coordinator", flags.coordinator.address, "Address: host:port or unix:/path")
       ->envname("WEFT_COORDINATOR")
       ->check(CLI::Validator(weft::v1::mistake_in_address, "", "address"))
       ->capture_default_str();
+  weft::security::add_security_options(app, flags.coordinator);
   app.add_option("--name", flags.worker.name, "Name for people, at most 128 characters")
       ->check([](const std::string& name) {
         return !name.empty() && name.size() <= weft::v1::kNameLimitBytes
@@ -72,10 +83,26 @@ void declare(CLI::App& app, Flags& flags) {
       ->check(CLI::Range(1U, weft::v1::kThreadsLimit))
       ->capture_default_str();
   app.add_option("--scratch", flags.worker.scratch,
-                 "Folder for inputs that are used again; may be shared between workers")
+                 "Folder for inputs that are used again and results until they are acknowledged; "
+                 "may be shared between workers")
       ->capture_default_str();
-  app.add_option("--scratch-limit", flags.scratch_limit_mib, "How much to keep there, in MiB")
+  app.add_option("--scratch-limit", flags.scratch_limit_mib,
+                 "How much of inputs to keep there, in MiB")
       ->check(CLI::Range(std::uint64_t{16}, std::uint64_t{1} << 30U))
+      ->capture_default_str();
+  app.add_option("--label", flags.worker.labels,
+                 "What jobs may ask for, as in gpu or room=12; may be repeated")
+      ->check(CLI::Validator(mistake_in_label, "", "label"))
+      ->expected(1, static_cast<int>(weft::v1::kLabelsLimit));
+  app.add_option("--wall-limit", flags.worker.wall_limit_seconds,
+                 "Ends by itself before it has run for so many seconds, and takes no task that is "
+                 "not expected to end before; 0: none")
+      ->check(CLI::Range(0.0, 1e8))
+      ->capture_default_str();
+  app.add_option("--exit-when-idle", flags.worker.idle_limit_seconds,
+                 "Ends when it had nothing to do for so many seconds, as when it is drained; 0: "
+                 "never")
+      ->check(CLI::Range(0.0, 1e8))
       ->capture_default_str();
   app.add_option("--log-level", flags.log_level, "error, warn, info or debug")
       ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
@@ -84,7 +111,10 @@ void declare(CLI::App& app, Flags& flags) {
       "Computes shards for a coordinator until it is told to end. SIGTERM or Ctrl-C: begins "
       "nothing\nmore, reports what is done and ends within ten seconds; a second one ends it at "
       "once. While the\ncoordinator is away the worker goes on with what it has and tries again.\n"
-      "Exits with 0 when it was told to end, 1 when the coordinator refuses it.\n"
+      "Results that the coordinator has not acknowledged stay in the scratch folder, and are\n"
+      "reported by the next worker that is started on it.\n"
+      "Exits with 0 when it was told to end, 1 when the coordinator refuses it or every thread\n"
+      "hangs.\n"
       "Example: weft-worker --coordinator 127.0.0.1:7411 --threads 4");
 }
 
@@ -94,17 +124,18 @@ void work(Flags flags) {
   spdlog::set_default_logger(log);
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
   weft::core::Interrupt interrupt;  // before any thread is started
+  // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
+  std::signal(SIGXFSZ, SIG_IGN);
+  flags.worker.coordinator = flags.coordinator.address;
+  flags.worker.end_process = [](int code) {
+    spdlog::shutdown();
+    std::_Exit(code);
+  };
   flags.worker.scratch_limit_bytes = flags.scratch_limit_mib * kMiB;
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(weft::v1::kMessageLimitBytes);
-  arguments.SetMaxSendMessageSize(weft::v1::kMessageLimitBytes);
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // The coordinator may be restarted at any time; gRPC's own waits grow to minutes.
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 200);
   weft::worker::LeaseLoop loop(
       std::move(flags.worker),
-      grpc::CreateCustomChannel(flags.coordinator, grpc::InsecureChannelCredentials(), arguments));
+      weft::security::open_channel(flags.coordinator, kLongestReconnectMs));
   loop.run([&] { return interrupt.requested(); });
 }
 
