@@ -244,12 +244,12 @@ TEST_F(NodeTest, ReportsItsHealthAndDrains) {
 
 TEST_F(NodeTest, RefusesAnAddressThatOthersReach) {
   try {
-    const RenderNode node(options_, "0.0.0.0:0", false);
+    const RenderNode node(options_, security::Endpoint("0.0.0.0:0"));
     ADD_FAILURE() << "it listens at " << node.address();
   } catch (const core::Error& error) {
     EXPECT_EQ(error.code(), core::Code::kPermissionDenied);
   }
-  const RenderNode node(options_, "127.0.0.1:0", false);
+  const RenderNode node(options_, security::Endpoint("127.0.0.1:0"));
   EXPECT_NE(node.address(), "127.0.0.1:0");
 }
 
