@@ -4,6 +4,8 @@
 
 #include "core/check.h"
 
+// Jobs: submitted, planned, bound to workers of one kind, ended.
+
 namespace weft::coordinator {
 
 Queue::Queue(QueueSettings settings, std::uint32_t epoch)
@@ -12,6 +14,14 @@ Queue::Queue(QueueSettings settings, std::uint32_t epoch)
 }
 
 Actions Queue::apply(const Event& event, Time now) {
+  const std::chrono::milliseconds passed = now - last_event_at_;
+  const std::chrono::milliseconds stall(settings_.stall_ms);
+  if (last_event_at_ != Time{} && (passed > stall || passed < -stall)) {
+    shift(passed);
+  } else {
+    now = std::max(now, last_event_at_);
+  }
+  last_event_at_ = now;
   Actions actions;
   std::visit([&](const auto& e) { on(e, now, actions); }, event);
   return actions;
@@ -35,16 +45,18 @@ std::vector<const JobState*> Queue::jobs() const {
   return jobs;
 }
 
+std::size_t Queue::unfinished_jobs_of(const std::string& user) const {
+  return static_cast<std::size_t>(std::count_if(jobs_.begin(), jobs_.end(), [&](const auto& entry) {
+    return !entry.second.has_ended() && entry.second.demands.user == user;
+  }));
+}
+
 void Queue::forget_job(const std::string& id) {
   const auto order = order_of_job_.find(id);
   CHECK(order != order_of_job_.end());
   CHECK(jobs_.at(order->second).has_ended());
   jobs_.erase(order->second);
   order_of_job_.erase(order);
-}
-
-bool Queue::is_live(const WorkerState& worker, Time now) const {
-  return now - worker.seen_at <= std::chrono::milliseconds(settings_.lease_ms);
 }
 
 std::vector<StageResults> Queue::finished_stages(const JobState& job) const {
@@ -70,6 +82,7 @@ void Queue::on(const SubmitEvent& event, Time now, Actions& actions) {
   job.demands = event.demands;
   job.is_paused = event.is_paused;
   job.served_at = now;
+  job.waiting_since = now;
   if (event.fingerprint) {
     job.fingerprint = event.fingerprint;
     ask_for_plan(job, actions);
@@ -120,12 +133,11 @@ void Queue::on(const PlannedEvent& event, Time now, Actions& actions) {
   }
   if (any_done) {
     ask_for_plan(*job, actions);
-  } else if (event.stages.empty() &&
-             std::all_of(job->stages.begin(), job->stages.end(),
-                         [](const StageState& stage) { return stage.is_done(); })) {
-    job->phase = JobPhase::kCommitting;
-    actions.commit.push_back({job->id, job->generation});
+  } else {
+    job->is_planned = event.stages.empty();
   }
+  refresh(*job, now);
+  settle(*job, now, actions);
 }
 
 void Queue::on(const ResultLostEvent& event, Time now, Actions& actions) {
@@ -139,7 +151,7 @@ void Queue::on(const ResultLostEvent& event, Time now, Actions& actions) {
         uses_it = stage.shards[i] == ShardState::kDone && stage.results[i] == event.result;
       }
     }
-    if (uses_it && job.generation >= settings_.reset_limit) {
+    if (uses_it && ++job.results_lost > settings_.reset_limit) {
       job.error =
           "results of this job were lost from the coordinator's disk again and again "
           "(last: " +
@@ -153,10 +165,18 @@ void Queue::on(const ResultLostEvent& event, Time now, Actions& actions) {
 
 void Queue::on(const TickEvent& /*event*/, Time now, Actions& actions) {
   expire(now, actions);
+  for (auto& [id, worker] : workers_) {
+    count(worker, now);
+  }
   bind_jobs(now, actions);
+  watch(now, actions);
+  look_after_audits(now, actions);
+  const std::chrono::milliseconds memory(settings_.forget_worker_ms);
   std::erase_if(workers_, [&](const auto& entry) {
-    return now - entry.second.seen_at > std::chrono::milliseconds(settings_.forget_worker_ms);
+    return !is_live(entry.second, now) && now - entry.second.seen_at > memory;
   });
+  std::erase_if(lost_, [&](const auto& entry) { return now - entry.second.at > memory; });
+  std::erase_if(passed_at_, [&](const auto& entry) { return now - entry.second > 2 * memory; });
 }
 
 void Queue::ask_for_plan(JobState& job, Actions& actions) {
@@ -170,55 +190,62 @@ void Queue::ask_for_plan(JobState& job, Actions& actions) {
   actions.plan.push_back({job.id, job.generation, *job.fingerprint});
 }
 
-void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& planned, Time now,
-                      Actions& actions) {
-  StageState& stage = job.stages.emplace_back();
-  const std::size_t index = job.stages.size() - 1;
-  const std::size_t count = planned.digests.size();
-  stage.name = planned.name;
-  stage.digests = planned.digests;
-  stage.shards.assign(count, ShardState::kPending);
-  stage.results.assign(count, core::Digest{});
-  stage.started_at = now;
-  for (const KnownResult& known : planned.known) {
-    CHECK_LT(known.shard, count);
-    if (stage.shards[known.shard] == ShardState::kPending) {
-      stage.shards[known.shard] = ShardState::kDone;
-      stage.results[known.shard] = known.result;
-      ++stage.done;
-      ++stage.cached;
+// What becomes of a job that has nothing to run any more, or too much that cannot run.
+void Queue::settle(JobState& job, Time now, Actions& actions) {
+  if (job.has_ended() || job.phase == JobPhase::kCommitting) {
+    return;
+  }
+  const std::uint64_t quarantined = job.quarantined();
+  const bool can_go_on =
+      job.planning || std::any_of(job.stages.begin(), job.stages.end(), [](const StageState& s) {
+        return s.done + s.quarantined < s.shards.size();
+      });
+  if (quarantined > 0 && (!can_go_on || quarantined >= settings_.quarantine_limit)) {
+    std::uint64_t named = 0;
+    for (const Trouble& trouble : job.troubles) {
+      if (trouble.kind != Trouble::Kind::kMismatch && named < 3) {
+        job.error += (named++ == 0 ? "" : "\n") + trouble.message;
+      }
     }
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    if (stage.shards[i] == ShardState::kPending) {
-      unfinished_[stage.digests[i]].push_back({order, index, i});
+    if (named < quarantined) {
+      job.error += "\nand " + std::to_string(quarantined - named) + " more";
     }
+    end_job(job, JobPhase::kFailed, now, actions);
+  } else if (job.is_planned && quarantined == 0 && !can_go_on && job.unconfirmed() == 0) {
+    job.phase = JobPhase::kCommitting;
+    ++job.revision;
+    actions.commit.push_back({job.id, job.generation});
   }
-  for (const PriorFailure& prior : planned.failures) {
-    if (prior.shard < count) {
-      ShardTrouble& trouble = stage.troubles[prior.shard];
-      ++trouble.failures;
-      trouble.workers.insert(prior.worker);
-      trouble.messages[prior.message].insert(prior.worker);
-    }
+}
+
+// Notes whether the job has something for a worker.
+void Queue::refresh(JobState& job, Time now) {
+  const bool is_ready =
+      !job.has_ended() && !job.is_paused && job.phase != JobPhase::kCommitting &&
+      std::any_of(job.stages.begin(), job.stages.end(), [](const StageState& stage) {
+        return stage.pending() > 0 || !stage.audits.empty() || !stage.disputed.empty();
+      });
+  if (is_ready == job.is_ready) {
+    return;
   }
-  if (stage.is_done()) {
-    stage.ended_at = now;
-  }
-  for (const PriorAttempt& prior : planned.attempts) {
-    restore(job, index, prior, now, actions);
-  }
-  if (stage.done > 0 || stage.running > 0) {
-    job.phase = JobPhase::kRunning;
+  job.is_ready = is_ready;
+  if (is_ready) {
+    ready_.insert(order_of_job_.at(job.id));
+    job.waiting_since = now;
+    shares_.arrive(job.demands.user, job.id);
+  } else {
+    ready_.erase(order_of_job_.at(job.id));
   }
 }
 
 void Queue::end_job(JobState& job, JobPhase phase, Time now, Actions& actions) {
-  drop_work(job, phase == JobPhase::kSucceeded ? Outcome::kSuperseded : Outcome::kStopped, now,
-            actions);
   job.phase = phase;
   job.ended_at = now;
   ++job.revision;
+  drop_work(job, phase == JobPhase::kSucceeded ? Outcome::kSuperseded : Outcome::kStopped, now,
+            actions);
+  leave_disputes(job, actions);
+  shares_.forget(job.demands.user, job.id);
   actions.ended.push_back(job.id);
   actions.wake = true;
 }
@@ -226,21 +253,30 @@ void Queue::end_job(JobState& job, JobPhase phase, Time now, Actions& actions) {
 // Takes all of the job's shards out of the queue; its attempts no longer own anything, and their
 // workers are told so when they report next.
 void Queue::drop_work(JobState& job, Outcome outcome, Time now, Actions& actions) {
-  const std::uint64_t order = order_of_job_.at(job.id);
-  for (std::size_t s = 0; s < job.stages.size(); ++s) {
+  const auto order = static_cast<std::uint32_t>(order_of_job_.at(job.id));
+  stop_attempts(job, outcome, "", now, actions);
+  for (std::uint32_t s = 0; s < job.stages.size(); ++s) {
     StageState& stage = job.stages[s];
-    for (std::size_t i = 0; i < stage.shards.size(); ++i) {
+    for (std::uint64_t i = 0; i < stage.shards.size(); ++i) {
       if (stage.shards[i] != ShardState::kDone) {
-        forget_ref(stage.digests[i], {order, s, i});
+        forget_ref(stage.digests[i], {i, order, s});
+      }
+      if (stage.shards[i] == ShardState::kElsewhere) {
         stage.shards[i] = ShardState::kPending;
       }
     }
-    stage.running = 0;
-    const std::set<std::uint64_t> attempts = stage.attempts;
-    for (const std::uint64_t id : attempts) {
-      end_attempt(id, outcome, "", now, actions);
+    stage.elsewhere = 0;
+    stage.fresh.clear();
+    for (ShardRanges& suspects : stage.suspects) {
+      suspects.clear();
     }
+    stage.retries.clear();
+    stage.deadly.clear();
+    stage.audits.clear();
+    stage.disputed.clear();
   }
+  job.is_ready = false;
+  ready_.erase(order);
 }
 
 void Queue::begin_again(JobState& job, Time now, Actions& actions) {
@@ -251,6 +287,9 @@ void Queue::begin_again(JobState& job, Time now, Actions& actions) {
   job.phase = job.phase == JobPhase::kQueued ? JobPhase::kQueued : JobPhase::kRunning;
   job.planning = false;
   job.plan_again = false;
+  job.is_planned = false;
+  std::erase_if(job.troubles,
+                [](const Trouble& trouble) { return trouble.kind != Trouble::Kind::kMismatch; });
   actions.wake = true;
   ask_for_plan(job, actions);
 }

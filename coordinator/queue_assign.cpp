@@ -1,18 +1,17 @@
 #include <algorithm>
-#include <cmath>
+#include <tuple>
 
 #include "coordinator/queue.h"
 #include "core/check.h"
 
-// Which worker is given which run of shards.
+// Which job a worker works for next, and what it is given.
 
 namespace weft::coordinator {
 
 namespace {
 
-std::uint64_t ceil_div(std::uint64_t count, std::uint64_t divisor) {
-  return (count + divisor - 1) / divisor;
-}
+// By how many runs a job may be ahead of its share when its scene is there already.
+constexpr double kNearLead = 2;
 
 }  // namespace
 
@@ -29,222 +28,143 @@ void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
   std::uint32_t free = report.free_attempts;
   // What the worker owns and did not list was in an answer that it never saw.
   for (const Attempt* const owned : attempts_of(report.worker)) {
-    const Attempt& attempt = *owned;
     ++held;
     const bool is_listed =
         std::any_of(report.running.begin(), report.running.end(),
-                    [&](const RunningClaim& claim) { return claim.attempt == attempt.id; });
+                    [&](const RunningClaim& claim) { return claim.attempt == owned->id; });
     if (!is_listed) {
-      actions.reply.assignments.push_back(describe(attempt));
+      actions.reply.assignments.push_back(describe(*owned));
       free -= free > 0 ? 1 : 0;
     }
   }
   const WorkerState& worker = workers_.at(report.worker);
   for (; free > 0; --free) {
-    const std::optional<Run> run = next_run(worker, held > 0, now);
+    std::optional<Run> run = next_run(worker, held > 0, now);
+    if (!run && held == 0) {
+      run = second_run(worker, now);
+    }
     if (!run) {
       return;
     }
-    JobState& job = jobs_.at(run->job_order);
-    StageState& stage = job.stages[run->stage];
-    Attempt attempt;
-    attempt.id = next_attempt_++;
-    attempt.job = job.id;
-    attempt.stage = run->stage;
-    attempt.first_shard = run->first_shard;
-    attempt.shards = run->shards;
-    attempt.worker = worker.id;
-    attempt.worker_name = worker.name;
-    attempt.token = make_token(stage, run->first_shard, run->shards);
-    for (std::uint64_t i = 0; i < run->shards; ++i) {
-      stage.shards[run->first_shard + i] = ShardState::kRunning;
-    }
-    stage.running += run->shards;
-    if (job.started_at == Time{}) {
-      job.started_at = now;
-    }
-    job.phase = JobPhase::kRunning;
-    ++job.revision;
-    const Attempt& begun = begin_attempt(std::move(attempt), now);
-    actions.attempts_begun.push_back(record_of(begun));
-    actions.reply.assignments.push_back(describe(begun));
+    give(*run, worker, now, actions);
     ++held;
-    if (stage.rate.empty()) {
-      sample_rate(run->job_order, now);
-    }
   }
 }
 
-std::optional<Queue::Run> Queue::next_run(const WorkerState& worker, bool is_busy, Time now) {
-  if (drained_.contains(worker.name)) {
-    return std::nullopt;
+void Queue::give(const Run& run, const WorkerState& worker, Time now, Actions& actions) {
+  JobState& job = jobs_.at(run.job_order);
+  StageState& stage = job.stages[run.stage];
+  Attempt attempt;
+  attempt.id = next_attempt_++;
+  attempt.job = job.id;
+  attempt.stage = run.stage;
+  attempt.first_shard = run.first_shard;
+  attempt.shards = run.shards;
+  attempt.worker = worker.id;
+  attempt.worker_name = worker.name;
+  attempt.purpose = run.purpose;
+  attempt.losses = run.losses;
+  attempt.token = make_token(stage, run.first_shard, run.shards);
+  const double threads = std::min<double>(worker.threads, static_cast<double>(run.shards));
+  attempt.charged_ms = stage.shard_thread_ms > 0
+                           ? stage.shard_thread_ms * static_cast<double>(run.shards)
+                           : threads * settings_.shortest_run_ms;
+  shares_.charge(job.demands.user, job.id, attempt.charged_ms);
+  CHECK_GT(take_shards(attempt), 0U);
+  job.speculative_attempts += run.purpose == Purpose::kSpeculation ? 1 : 0;
+  job.started_at = job.started_at == Time{} ? now : job.started_at;
+  job.phase = JobPhase::kRunning;
+  job.waiting_since = now;
+  ++job.revision;
+  const Attempt& begun = begin_attempt(std::move(attempt), now);
+  actions.attempts_begun.push_back(record_of(begun));
+  actions.reply.assignments.push_back(describe(begun));
+  refresh(job, now);
+  if (stage.rate.empty()) {
+    sample_rate(run.job_order, now);
   }
-  const auto blocked = blocked_.find(worker.name);
-  for (auto& [order, job] : jobs_) {
-    if (job.has_ended() || job.is_paused || job.fingerprint != worker.fingerprint) {
+}
+
+std::int64_t Queue::priority(const JobState& job, Time now) const {
+  return job.demands.priority + (now - job.waiting_since).count() / settings_.ageing_ms;
+}
+
+// The jobs that have something for workers of this kind, whose turn it is first.
+std::vector<std::uint64_t> Queue::order_for(const WorkerState& worker, Time now) const {
+  struct Candidate {
+    std::uint64_t order;
+    std::int64_t priority;
+    double of_user;
+    double of_job;
+    bool is_near;
+  };
+  std::vector<Candidate> candidates;
+  std::map<std::int64_t, double> least_of_users;  // by priority
+  std::map<std::pair<std::int64_t, std::string>, double> least_of_jobs;
+  for (const std::uint64_t order : ready_) {
+    const JobState& job = jobs_.at(order);
+    if (job.fingerprint != worker.fingerprint) {
       continue;
     }
+    const bool is_near =
+        std::any_of(job.stages.begin(), job.stages.end(), [&](const StageState& stage) {
+          return stage.pending() > 0 && stage.scene != core::Digest{} &&
+                 std::find(worker.scenes.begin(), worker.scenes.end(), stage.scene) !=
+                     worker.scenes.end();
+        });
+    const Candidate candidate{order, priority(job, now), shares_.of_user(job.demands.user),
+                              shares_.of_job(job.demands.user, job.id), is_near};
+    candidates.push_back(candidate);
+    const auto of_users = least_of_users.emplace(candidate.priority, candidate.of_user).first;
+    of_users->second = std::min(of_users->second, candidate.of_user);
+    const auto of_jobs =
+        least_of_jobs.emplace(std::pair(candidate.priority, job.demands.user), candidate.of_job)
+            .first;
+    of_jobs->second = std::min(of_jobs->second, candidate.of_job);
+  }
+  const double lead_ms = kNearLead * settings_.target_run_ms * worker.threads;
+  for (Candidate& candidate : candidates) {
+    const std::string& user = jobs_.at(candidate.order).demands.user;
+    candidate.is_near = candidate.is_near &&
+                        candidate.of_user <= least_of_users.at(candidate.priority) + lead_ms &&
+                        candidate.of_job <= least_of_jobs.at({candidate.priority, user}) + lead_ms;
+  }
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return std::tuple(-a.priority, !a.is_near, a.of_user, a.of_job, a.order) <
+           std::tuple(-b.priority, !b.is_near, b.of_user, b.of_job, b.order);
+  });
+  std::vector<std::uint64_t> orders;
+  for (const Candidate& candidate : candidates) {
+    orders.push_back(candidate.order);
+  }
+  return orders;
+}
+
+std::optional<Queue::Run> Queue::next_run(const WorkerState& worker, bool is_busy, Time now) {
+  if (ready_.empty() || drained_.contains(worker.name)) {
+    return std::nullopt;
+  }
+  for (const std::uint64_t order : order_for(worker, now)) {
+    const JobState& job = jobs_.at(order);
     for (std::size_t s = 0; s < job.stages.size(); ++s) {
-      StageState& stage = job.stages[s];
-      const auto backoff = stage.backoffs.find(worker.id);
-      const bool must_wait = backoff != stage.backoffs.end() && now < backoff->second.until;
-      const bool is_blocked = blocked != blocked_.end() && blocked->second.contains(stage.name);
-      if (stage.pending() == 0 || must_wait || is_blocked) {
+      const StageState& stage = job.stages[s];
+      const bool has_audits = !stage.audits.empty() || !stage.disputed.empty();
+      if ((stage.pending() == 0 && !has_audits) ||
+          hindrance(worker, job, stage, now).obstacle != Obstacle::kNone) {
         continue;
       }
-      const std::uint64_t size = run_size(job, stage, worker, is_busy, now);
-      const std::optional<Run> run = size == 0 ? std::nullopt : run_of(order, s, worker, size, now);
+      const std::uint64_t size =
+          stage.pending() == 0 ? 0 : run_size(job, stage, worker, is_busy, now);
+      std::optional<Run> run = size == 0 ? std::nullopt : pending_run(order, s, worker, size, now);
+      if (!run && has_audits) {
+        run = audit_run(order, s, worker, sized(stage, worker, 0, now));
+      }
       if (run) {
         return run;
       }
     }
   }
   return std::nullopt;
-}
-
-// The first shards in a row, at most `limit`, that this worker may run now. Shards that were with
-// workers when those were lost come last, those with the fewest losses first: they may be the
-// cause.
-std::optional<Queue::Run> Queue::run_of(std::uint64_t order, std::size_t index,
-                                        const WorkerState& worker, std::uint64_t limit, Time now) {
-  StageState& stage = jobs_.at(order).stages[index];
-  const std::uint64_t count = stage.shards.size();
-  while (stage.first_pending < count && stage.shards[stage.first_pending] != ShardState::kPending) {
-    ++stage.first_pending;
-  }
-  const auto may = [&](std::uint64_t shard) {
-    return may_run(stage, {order, index, shard}, worker, now);
-  };
-  for (std::uint64_t i = stage.first_pending; i < count; ++i) {
-    const auto trouble = stage.troubles.find(i);
-    const bool has_trouble = trouble != stage.troubles.end();
-    if ((has_trouble && trouble->second.losses > 0) || !may(i)) {
-      continue;
-    }
-    Run run{order, index, i, 1};
-    // A shard in trouble runs alone, so that it takes no other with it and is found out.
-    while (!has_trouble && run.shards < limit && i + run.shards < count && may(i + run.shards) &&
-           !stage.troubles.contains(i + run.shards)) {
-      ++run.shards;
-    }
-    return run;
-  }
-  std::optional<Run> run;
-  std::uint32_t fewest = ~std::uint32_t{0};
-  for (const auto& [shard, trouble] : stage.troubles) {
-    if (trouble.losses < fewest && may(shard)) {
-      fewest = trouble.losses;
-      run = Run{order, index, shard, 1};
-    }
-  }
-  return run;
-}
-
-bool Queue::may_run(const StageState& stage, const ShardRef& ref, const WorkerState& worker,
-                    Time now) const {
-  if (stage.shards[ref.shard] != ShardState::kPending) {
-    return false;
-  }
-  const auto same = unfinished_.find(stage.digests[ref.shard]);
-  CHECK(same != unfinished_.end());
-  for (const ShardRef& other : same->second) {
-    const StageState& its_stage = jobs_.at(other.job_order).stages[other.stage];
-    if (its_stage.shards[other.shard] == ShardState::kRunning) {
-      return false;  // that run's result will be ours too
-    }
-  }
-  const auto found = stage.troubles.find(ref.shard);
-  if (found == stage.troubles.end()) {
-    return true;
-  }
-  const ShardTrouble& trouble = found->second;
-  if (now < trouble.retry_at) {
-    return false;
-  }
-  // A shard that failed here is left to the others, if there are any where it did not.
-  const bool failed_here = trouble.workers.contains(worker.id);
-  return !failed_here || std::none_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
-    const auto backoff = stage.backoffs.find(entry.first);
-    return is_live(entry.second, now) && entry.second.fingerprint == worker.fingerprint &&
-           !trouble.workers.contains(entry.first) &&
-           (backoff == stage.backoffs.end() || now >= backoff->second.until);
-  });
-}
-
-// How many shards to give at once; 0: leave what there is to workers that have nothing.
-std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
-                              const WorkerState& worker, bool is_busy, Time now) const {
-  std::uint64_t workers = 0;
-  std::uint64_t idle = 0;  // of the others
-  std::uint64_t idle_threads = 0;
-  for (const auto& entry : workers_) {
-    const WorkerState& other = entry.second;
-    if (!is_live(other, now) || job.fingerprint != other.fingerprint) {
-      continue;
-    }
-    ++workers;
-    const bool has_attempt = attempts_of_worker_.contains(other.id);
-    if (other.id != worker.id && !has_attempt) {
-      ++idle;
-      idle_threads += other.threads;
-    }
-  }
-  CHECK_GT(workers, 0U);
-  const std::uint64_t pending = stage.pending();
-  if (is_busy && pending <= idle_threads) {
-    return 0;
-  }
-  const std::uint64_t per_thread =
-      std::min<std::uint64_t>(worker.threads, ceil_div(pending, 1 + idle));
-  if (stage.shard_thread_ms <= 0) {
-    return std::max<std::uint64_t>(per_thread, 1);  // the first runs of a stage measure it
-  }
-  const double per_ms = static_cast<double>(worker.threads) / stage.shard_thread_ms;
-  const auto shards_in = [&](std::uint32_t ms) {
-    const double shards = std::min(per_ms * ms, static_cast<double>(settings_.run_limit_shards));
-    return static_cast<std::uint64_t>(shards);
-  };
-  // Large runs first, smaller ones towards the end, so that the workers end together.
-  const std::uint64_t share = ceil_div(pending, 2 * workers);
-  const std::uint64_t size = std::min(shards_in(settings_.target_run_ms),
-                                      std::max(share, shards_in(settings_.shortest_run_ms)));
-  return std::max<std::uint64_t>({size, per_thread, 1});
-}
-
-std::string Queue::waiting_for(const JobState& job, Time now) const {
-  if (job.has_ended() || job.phase == JobPhase::kCommitting) {
-    return "";
-  }
-  const bool any_live = std::any_of(workers_.begin(), workers_.end(),
-                                    [&](const auto& w) { return is_live(w.second, now); });
-  if (!any_live) {
-    return "a worker: none is connected";
-  }
-  std::vector<const WorkerState*> able;
-  for (const auto& [id, worker] : workers_) {
-    if (is_live(worker, now) && job.fingerprint == worker.fingerprint) {
-      able.push_back(&worker);
-    }
-  }
-  if (job.fingerprint && able.empty()) {
-    return "a worker whose numbers are equal to those the job began with (fingerprint " +
-           job.fingerprint->hex().substr(0, 12) + ")";
-  }
-  for (const StageState& stage : job.stages) {
-    if (stage.running > 0) {
-      return "";
-    }
-    const bool all_short =
-        !able.empty() && std::all_of(able.begin(), able.end(), [&](const WorkerState* worker) {
-          const auto backoff = stage.backoffs.find(worker->id);
-          return backoff != stage.backoffs.end() && now < backoff->second.until;
-        });
-    if (stage.pending() > 0 && all_short) {
-      return std::string("memory, disk or files for ") + to_string(stage.name) +
-             ", which are short on every worker";
-    }
-  }
-  return "";
 }
 
 }  // namespace weft::coordinator

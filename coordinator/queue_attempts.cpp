@@ -1,7 +1,9 @@
+#include <algorithm>
+
 #include "coordinator/queue.h"
 #include "core/check.h"
 
-// The life of an attempt: given, renewed, ended, and given back to its worker after a restart.
+// The life of an attempt: begun, renewed, ended.
 
 namespace weft::coordinator {
 
@@ -16,24 +18,29 @@ std::vector<const Attempt*> Queue::attempts_of(const std::string& worker_id) con
   return attempts;
 }
 
-// The caller marks its shards as running, and records it where it is new.
+AttemptRecord Queue::record_of(const Attempt& attempt) const {
+  return {attempt.job,         attempt.id,      job(attempt.job)->stages[attempt.stage].name,
+          attempt.first_shard, attempt.shards,  attempt.worker,
+          attempt.worker_name, attempt.purpose, attempt.began_at.time_since_epoch().count()};
+}
+
+// The caller has taken its shards, and records it where it is new.
 const Attempt& Queue::begin_attempt(Attempt attempt, Time now) {
   const std::uint64_t id = attempt.id;
   attempt.began_at = now;
   attempt.progress_at = now;
   attempt.lease_until = now + std::chrono::milliseconds(settings_.lease_ms);
+  attempt.active_at = attempts_of_worker_.contains(attempt.worker) ? Time{} : now;
   find_job(attempt.job)->stages[attempt.stage].attempts.insert(id);
   leases_.emplace(attempt.lease_until, id);
   attempts_of_worker_[attempt.worker].insert(id);
+  const auto worker = workers_.find(attempt.worker);
+  if (worker != workers_.end()) {
+    count(worker->second, now);
+  }
   const auto [entry, is_new] = attempts_.emplace(id, std::move(attempt));
   CHECK(is_new);
   return entry->second;
-}
-
-AttemptRecord Queue::record_of(const Attempt& attempt) const {
-  return {attempt.job,         attempt.id,      job(attempt.job)->stages[attempt.stage].name,
-          attempt.first_shard, attempt.shards,  attempt.worker,
-          attempt.worker_name, attempt.purpose, attempt.began_at.time_since_epoch().count()};
 }
 
 // The attempt owns nothing any more; its shards are left to the caller.
@@ -44,15 +51,51 @@ Attempt Queue::end_attempt(std::uint64_t id, Outcome outcome, const std::string&
   Attempt attempt = std::move(entry->second);
   attempts_.erase(entry);
   leases_.erase({attempt.lease_until, id});
+  slow_.erase(id);
   find_job(attempt.job)->stages[attempt.stage].attempts.erase(id);
   const auto held = attempts_of_worker_.find(attempt.worker);
   held->second.erase(id);
   if (held->second.empty()) {
     attempts_of_worker_.erase(held);
+  } else {
+    Attempt& next = attempts_.at(*held->second.begin());
+    next.active_at = next.active_at == Time{} ? now : next.active_at;
+  }
+  const auto worker = workers_.find(attempt.worker);
+  if (worker != workers_.end()) {
+    count(worker->second, now);
+    if (outcome == Outcome::kStopped) {
+      worker->second.settled.insert(id);  // people's order: its last report is no news
+    }
   }
   actions.attempts_ended.push_back(
       {attempt.job, id, outcome, attempt.shards_done, message, now.time_since_epoch().count()});
   return attempt;
+}
+
+// Marks what the attempt is to do as being done, and says how many shards that are.
+std::uint64_t Queue::take_shards(const Attempt& attempt) {
+  JobState& job = *find_job(attempt.job);
+  StageState& stage = job.stages[attempt.stage];
+  const auto order = static_cast<std::uint32_t>(order_of_job_.at(job.id));
+  const auto index = static_cast<std::uint32_t>(attempt.stage);
+  const std::uint64_t end = attempt.first_shard + attempt.shards;
+  std::uint64_t taken = 0;
+  if (attempt.purpose != Purpose::kAudit) {
+    stage.fresh.remove(attempt.first_shard, attempt.shards);
+  }
+  for (std::uint64_t shard = attempt.first_shard; shard < end; ++shard) {
+    if (attempt.purpose == Purpose::kAudit) {
+      taken += take_audit(stage, shard, attempt.id) ? 1 : 0;
+    } else if (stage.shards[shard] == ShardState::kPending) {
+      mark_running({shard, order, index});
+      ++taken;
+    } else if (stage.shards[shard] == ShardState::kRunning) {
+      ++stage.doubled[shard];
+      ++taken;
+    }
+  }
+  return taken;
 }
 
 void Queue::renew(Attempt& attempt, Time now) {
@@ -61,43 +104,21 @@ void Queue::renew(Attempt& attempt, Time now) {
   leases_.emplace(attempt.lease_until, attempt.id);
 }
 
-// What ran before a restart goes on: its worker owns it for one lease, and longer if it comes back.
-void Queue::restore(const JobState& job, std::size_t index, const PriorAttempt& prior, Time now,
-                    Actions& actions) {
-  StageState& stage = find_job(job.id)->stages[index];
-  const std::uint64_t count = stage.shards.size();
-  const bool is_prior = prior.id >> 32 < next_attempt_ >> 32 && !attempts_.contains(prior.id);
-  const bool fits = prior.first_shard < count && prior.shards <= count - prior.first_shard;
-  if (!is_prior || !fits) {
-    return;
-  }
-  const std::uint64_t end = prior.first_shard + prior.shards;
-  std::uint64_t taken = 0;
-  for (std::uint64_t shard = prior.first_shard; shard < end; ++shard) {
-    if (stage.shards[shard] == ShardState::kPending && !job.is_paused) {
-      stage.shards[shard] = ShardState::kRunning;
-      ++taken;
+void Queue::stop_attempts(JobState& job, Outcome outcome, const std::string& why, Time now,
+                          Actions& actions) {
+  for (std::size_t s = 0; s < job.stages.size(); ++s) {
+    const std::set<std::uint64_t> attempts = job.stages[s].attempts;
+    for (const std::uint64_t id : attempts) {
+      const Attempt attempt = end_attempt(id, outcome, why, now, actions);
+      release(attempt, attempt.losses, now);
     }
   }
-  if (taken == 0) {
-    actions.attempts_ended.push_back(
-        {job.id, prior.id, job.is_paused ? Outcome::kStopped : Outcome::kSuperseded, 0,
-         job.is_paused ? "its job was paused" : "others brought its results",
-         now.time_since_epoch().count()});
-    return;
+}
+
+void Queue::expire(Time now, Actions& actions) {
+  while (!leases_.empty() && leases_.begin()->first < now) {
+    lose(leases_.begin()->second, now, actions);
   }
-  stage.running += taken;
-  Attempt attempt;
-  attempt.id = prior.id;
-  attempt.job = job.id;
-  attempt.stage = index;
-  attempt.first_shard = prior.first_shard;
-  attempt.shards = prior.shards;
-  attempt.worker = prior.worker;
-  attempt.worker_name = prior.worker_name;
-  attempt.purpose = prior.purpose;
-  attempt.token = make_token(stage, prior.first_shard, prior.shards);
-  begin_attempt(std::move(attempt), now);
 }
 
 }  // namespace weft::coordinator

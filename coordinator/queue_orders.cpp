@@ -41,10 +41,14 @@ bool Queue::is_drained(const std::string& worker_name) const {
 }
 
 std::vector<StageName> Queue::blocked_stages(const std::string& worker_name) const {
+  std::vector<StageName> stages;
   const auto blocked = blocked_.find(worker_name);
-  return blocked == blocked_.end()
-             ? std::vector<StageName>{}
-             : std::vector<StageName>(blocked->second.begin(), blocked->second.end());
+  if (blocked != blocked_.end()) {
+    for (const auto& [stage, is_liar] : blocked->second) {
+      stages.push_back(stage);
+    }
+  }
+  return stages;
 }
 
 // A paused job's attempts own nothing any more: their workers are told to stop when they report.
@@ -57,13 +61,9 @@ void Queue::on(const PauseEvent& event, Time now, Actions& actions) {
   ++job->revision;
   actions.wake = true;
   if (job->is_paused) {
-    for (const StageState& stage : job->stages) {
-      const std::set<std::uint64_t> attempts = stage.attempts;
-      for (const std::uint64_t id : attempts) {
-        release(end_attempt(id, Outcome::kStopped, "its job was paused", now, actions));
-      }
-    }
+    stop_attempts(*job, Outcome::kStopped, "its job was paused", now, actions);
   }
+  refresh(*job, now);
 }
 
 void Queue::on(const PriorityEvent& event, Time /*now*/, Actions& actions) {
@@ -75,33 +75,48 @@ void Queue::on(const PriorityEvent& event, Time /*now*/, Actions& actions) {
   }
 }
 
-void Queue::on(const DrainEvent& event, Time /*now*/, Actions& actions) {
+void Queue::on(const DrainEvent& event, Time now, Actions& actions) {
   if (event.is_drained) {
     drained_.insert(event.worker_name);
   } else {
     drained_.erase(event.worker_name);
     actions.wake = true;
   }
+  for (auto& [id, worker] : workers_) {
+    if (worker.name == event.worker_name) {
+      count(worker, now);
+    }
+  }
 }
 
 void Queue::on(const BlockEvent& event, Time /*now*/, Actions& actions) {
   if (event.is_blocked) {
-    blocked_[event.worker_name].insert(event.stage);
+    blocked_[event.worker_name][event.stage] = event.is_liar;
     return;
   }
+  conduct_.erase({event.worker_name, event.stage});
   const auto blocked = blocked_.find(event.worker_name);
-  if (blocked != blocked_.end() && blocked->second.erase(event.stage) > 0) {
-    actions.wake = true;
+  if (blocked == blocked_.end() || blocked->second.erase(event.stage) == 0) {
+    return;
   }
+  if (blocked->second.empty()) {
+    blocked_.erase(blocked);
+  }
+  actions.blocks.push_back({event.worker_name, event.stage, false, false});
+  actions.wake = true;
 }
 
 void Queue::on(const DisconnectEvent& event, Time now, Actions& actions) {
-  const auto held = attempts_of_worker_.find(event.worker);
-  if (held == attempts_of_worker_.end()) {
-    return;
+  const auto worker = workers_.find(event.worker);
+  if (worker != workers_.end()) {
+    worker->second.is_disconnected = true;
+    count(worker->second, now);
   }
-  const std::set<std::uint64_t> ids = held->second;
-  for (const std::uint64_t id : ids) {
+  std::vector<std::uint64_t> held;
+  for (const Attempt* const attempt : attempts_of(event.worker)) {
+    held.push_back(attempt->id);
+  }
+  for (const std::uint64_t id : held) {
     lose(id, now, actions);
   }
 }

@@ -3,161 +3,263 @@
 #include "coordinator/queue.h"
 #include "core/check.h"
 
-// What becomes of single shards: done, failed, given back, lost.
+// What becomes of single shards: pending, running, done, given back.
 
 namespace weft::coordinator {
 
 namespace {
 
 constexpr auto kRateWindow = std::chrono::seconds(60);
+constexpr auto kRateStep = std::chrono::seconds(1);
 constexpr std::size_t kRateSamples = 256;
-
-std::string in_words(const StageState& stage, std::uint64_t shard) {
-  return std::string(to_string(stage.name)) + " shard " + std::to_string(shard) + " of " +
-         std::to_string(stage.shards.size());
-}
 
 }  // namespace
 
-void Queue::forget_ref(const core::Digest& work, const ShardRef& ref) {
-  const auto found = unfinished_.find(work);
-  if (found == unfinished_.end()) {
-    return;
+const std::string& Queue::author_name(std::uint32_t author) const { return names_.at(author); }
+
+std::uint32_t Queue::author_of(const std::string& worker_name) {
+  if (worker_name.empty()) {
+    return 0;
   }
-  std::erase(found->second, ref);
-  if (found->second.empty()) {
+  const auto [entry, is_new] =
+      author_of_name_.emplace(worker_name, static_cast<std::uint32_t>(names_.size()));
+  if (is_new) {
+    names_.push_back(worker_name);
+  }
+  return entry->second;
+}
+
+void Queue::add_ref(const core::Digest& work, const ShardRef& ref) {
+  twins_ += unfinished_.contains(work) ? 1 : 0;
+  unfinished_.emplace(work, ref);
+}
+
+void Queue::forget_ref(const core::Digest& work, const ShardRef& ref) {
+  const auto [begin, end] = unfinished_.equal_range(work);
+  const auto found =
+      std::find_if(begin, end, [&](const auto& entry) { return entry.second == ref; });
+  if (found != end) {
     unfinished_.erase(found);
+    twins_ -= unfinished_.contains(work) ? 1 : 0;
   }
 }
 
 // Ends a shard in every job that has it.
-void Queue::finish_shard(const core::Digest& work, const core::Digest& result, Time now,
-                         Actions& actions) {
-  const auto found = unfinished_.find(work);
-  CHECK(found != unfinished_.end());
-  const std::vector<ShardRef> refs = std::move(found->second);
-  unfinished_.erase(found);
+void Queue::finish_shard(const core::Digest& work, const core::Digest& result,
+                         const std::string& worker, Time now, Actions& actions) {
+  const auto [begin, end] = unfinished_.equal_range(work);
+  CHECK(begin != end);
+  std::vector<ShardRef> refs;
+  for (auto it = begin; it != end; ++it) {
+    refs.push_back(it->second);
+  }
+  unfinished_.erase(begin, end);
+  twins_ -= refs.size() - 1;
+  std::set<std::string> failed_on;
+  StageName name = StageName::kGeometry;
   for (const ShardRef& ref : refs) {
-    JobState& job = jobs_.at(ref.job_order);
-    StageState& stage = job.stages[ref.stage];
-    if (stage.shards[ref.shard] == ShardState::kRunning) {
-      --stage.running;
+    const StageState& stage = jobs_.at(ref.job_order).stages[ref.stage];
+    name = stage.name;
+    const auto trouble = stage.troubles.find(ref.shard);
+    if (trouble != stage.troubles.end()) {
+      for (const auto& [failed, times] : trouble->second.failures) {
+        failed_on.insert(failed);
+      }
     }
-    stage.shards[ref.shard] = ShardState::kDone;
-    stage.results[ref.shard] = result;
-    ++stage.done;
-    stage.troubles.erase(ref.shard);
-    ++job.revision;
-    if (stage.is_done()) {
-      stage.ended_at = now;
-      actions.wake = true;
-      ask_for_plan(job, actions);
+    mark_done(ref, result, author_of(worker), now, actions);
+  }
+  failed_on.erase(worker);
+  for (const std::string& failed : failed_on) {
+    passed_elsewhere(failed, name, now, actions);
+  }
+  for (const ShardRef& ref : refs) {
+    settle(jobs_.at(ref.job_order), now, actions);
+  }
+}
+
+void Queue::mark_done(const ShardRef& ref, const core::Digest& result, std::uint32_t author,
+                      Time now, Actions& actions) {
+  JobState& job = jobs_.at(ref.job_order);
+  StageState& stage = job.stages[ref.stage];
+  switch (stage.shards[ref.shard]) {
+    case ShardState::kPending:
+      withdraw(stage, ref.shard);
+      break;
+    case ShardState::kRunning:
+      --stage.running;
+      stage.doubled.erase(ref.shard);
+      break;
+    case ShardState::kElsewhere:
+      --stage.elsewhere;
+      break;
+    case ShardState::kQuarantined:
+      --stage.quarantined;
+      std::erase_if(job.troubles, [&](const Trouble& trouble) {
+        return trouble.stage == stage.name && trouble.shard == ref.shard &&
+               trouble.kind != Trouble::Kind::kMismatch;
+      });
+      break;
+    case ShardState::kDone:
+      CHECK(false);
+  }
+  stage.shards[ref.shard] = ShardState::kDone;
+  stage.results[ref.shard] = result;
+  stage.authors[ref.shard] = author;
+  ++stage.done;
+  stage.troubles.erase(ref.shard);
+  ++job.revision;
+  if (is_chosen(stage.digests[ref.shard], job.demands.audit)) {
+    await_audit(stage, ref.shard, now);
+    actions.wake = actions.wake || stage.pending() == 0;
+  }
+  if (stage.is_done()) {
+    stage.ended_at = now;
+    actions.wake = true;
+    ask_for_plan(job, actions);
+  }
+  refresh(job, now);
+}
+
+// REQUIRES: the shard is pending. The caller has taken it from the fresh ones.
+void Queue::mark_running(const ShardRef& ref) {
+  StageState& stage = jobs_.at(ref.job_order).stages[ref.stage];
+  withdraw(stage, ref.shard);
+  stage.shards[ref.shard] = ShardState::kRunning;
+  ++stage.running;
+  if (twins_ == 0) {
+    return;
+  }
+  const auto [begin, end] = unfinished_.equal_range(stage.digests[ref.shard]);
+  for (auto it = begin; it != end; ++it) {
+    const ShardRef& twin = it->second;
+    JobState& its_job = jobs_.at(twin.job_order);
+    StageState& its_stage = its_job.stages[twin.stage];
+    if (its_stage.shards[twin.shard] == ShardState::kPending) {
+      withdraw(its_stage, twin.shard);
+      its_stage.shards[twin.shard] = ShardState::kElsewhere;
+      ++its_stage.elsewhere;
+      ++its_job.revision;
+      refresh(its_job, last_event_at_);
     }
   }
 }
 
-// Puts what an attempt leaves unfinished back among the pending shards. The caller erases it.
-void Queue::release(const Attempt& attempt) {
-  JobState* const job = find_job(attempt.job);
-  CHECK(job != nullptr);
-  StageState& stage = job->stages[attempt.stage];
-  for (std::uint64_t i = 0; i < attempt.shards; ++i) {
-    const std::uint64_t shard = attempt.first_shard + i;
-    if (stage.shards[shard] == ShardState::kRunning) {
-      stage.shards[shard] = ShardState::kPending;
-      --stage.running;
-      stage.first_pending = std::min(stage.first_pending, shard);
-    }
+// Queues a shard, unless equal work is running. REQUIRES: it is in none of the pending sets.
+void Queue::make_pending(const ShardRef& ref, std::size_t losses) {
+  StageState& stage = jobs_.at(ref.job_order).stages[ref.stage];
+  bool runs_elsewhere = false;
+  if (twins_ > 0) {
+    const auto [begin, end] = unfinished_.equal_range(stage.digests[ref.shard]);
+    runs_elsewhere = std::any_of(begin, end, [&](const auto& entry) {
+      const ShardRef& twin = entry.second;
+      return jobs_.at(twin.job_order).stages[twin.stage].shards[twin.shard] == ShardState::kRunning;
+    });
   }
-  ++job->revision;
+  stage.shards[ref.shard] = runs_elsewhere ? ShardState::kElsewhere : ShardState::kPending;
+  if (runs_elsewhere) {
+    ++stage.elsewhere;
+  } else {
+    put_back(stage, ref.shard, losses);
+  }
 }
 
-// The attempt's worker is gone: its shards go back. One that loses worker after worker while it
-// runs alone is taken for the cause.
-void Queue::lose(std::uint64_t id, Time now, Actions& actions) {
-  if (!attempts_.contains(id)) {
-    return;  // losing another one ended its job
+void Queue::put_back(StageState& stage, std::uint64_t shard, std::size_t losses) {
+  const auto trouble = stage.troubles.find(shard);
+  if (trouble != stage.troubles.end() && !trouble->second.lone_losses.empty()) {
+    stage.deadly.emplace(trouble->second.lone_losses.size(), shard);
+  } else if (trouble != stage.troubles.end()) {
+    stage.retries.emplace(trouble->second.retry_at, shard);
+  } else if (losses > 0) {
+    stage.suspects[std::min(losses, stage.suspects.size()) - 1].add(shard);
+  } else {
+    stage.fresh.add(shard);
   }
-  const Attempt attempt = end_attempt(id, Outcome::kLost, "its worker fell silent", now, actions);
-  actions.wake = true;
+}
+
+// Takes a pending shard out of where put_back put it.
+void Queue::withdraw(StageState& stage, std::uint64_t shard) {
+  const auto trouble = stage.troubles.find(shard);
+  if (trouble != stage.troubles.end()) {
+    stage.deadly.erase({trouble->second.lone_losses.size(), shard});
+    stage.retries.erase({trouble->second.retry_at, shard});
+    return;
+  }
+  stage.fresh.remove(shard);
+  for (ShardRanges& suspects : stage.suspects) {
+    if (!suspects.empty()) {
+      suspects.remove(shard);
+    }
+  }
+}
+
+// Puts what an attempt leaves unfinished back, but for what another attempt runs too. REQUIRES: the
+// attempt has ended.
+void Queue::release(const Attempt& attempt, std::size_t losses, Time now) {
   JobState& job = *find_job(attempt.job);
   StageState& stage = job.stages[attempt.stage];
+  ++job.revision;
+  if (attempt.purpose == Purpose::kAudit) {
+    put_back_audits(attempt, now);
+    refresh(job, now);
+    return;
+  }
+  const auto order = static_cast<std::uint32_t>(order_of_job_.at(job.id));
+  const auto index = static_cast<std::uint32_t>(attempt.stage);
   for (std::uint64_t i = 0; i < attempt.shards; ++i) {
     const std::uint64_t shard = attempt.first_shard + i;
     if (stage.shards[shard] != ShardState::kRunning) {
       continue;
     }
-    ShardTrouble& trouble = stage.troubles[shard];
-    ++trouble.losses;
-    trouble.lonely_losses += attempt.shards == 1 ? 1 : 0;
-    if (trouble.lonely_losses >= settings_.lonely_loss_limit) {
-      job.error = in_words(stage, shard) +
-                  " is quarantined: " + std::to_string(trouble.lonely_losses) +
-                  " workers were lost while they ran it alone (last: " + attempt.worker +
-                  "); look for crashes or kills for lack of memory on those workers";
+    const auto doubled = stage.doubled.find(shard);
+    if (doubled != stage.doubled.end()) {
+      if (--doubled->second == 0) {
+        stage.doubled.erase(doubled);
+      }
+      continue;
+    }
+    --stage.running;
+    const ShardRef ref{shard, order, index};
+    stage.shards[shard] = ShardState::kPending;
+    make_pending(ref, losses);
+    if (twins_ > 0) {
+      free_twins(ref, now);
     }
   }
-  release(attempt);
-  if (!job.error.empty()) {
-    end_job(job, JobPhase::kFailed, now, actions);
-  }
+  refresh(job, now);
 }
 
-void Queue::expire(Time now, Actions& actions) {
-  while (!leases_.empty() && leases_.begin()->first < now) {
-    lose(leases_.begin()->second, now, actions);
+// The run that others waited for is over without a result.
+void Queue::free_twins(const ShardRef& ref, Time now) {
+  const core::Digest work = jobs_.at(ref.job_order).stages[ref.stage].digests[ref.shard];
+  const auto [begin, end] = unfinished_.equal_range(work);
+  for (auto it = begin; it != end; ++it) {
+    JobState& job = jobs_.at(it->second.job_order);
+    StageState& stage = job.stages[it->second.stage];
+    if (stage.shards[it->second.shard] == ShardState::kElsewhere) {
+      --stage.elsewhere;
+      stage.shards[it->second.shard] = ShardState::kPending;
+      make_pending(it->second, 0);
+      ++job.revision;
+      refresh(job, now);
+    }
   }
-}
-
-// REQUIRES: the attempt owns its shards and has been released.
-void Queue::fail_shard(const Attempt& attempt, const Failure& failure, Time now, Actions& actions) {
-  JobState& job = *find_job(attempt.job);
-  StageState& stage = job.stages[attempt.stage];
-  const bool is_of_run =
-      failure.shard >= attempt.first_shard && failure.shard - attempt.first_shard < attempt.shards;
-  const std::uint64_t shard = is_of_run ? failure.shard : attempt.first_shard;
-  if (stage.shards[shard] == ShardState::kDone) {
-    return;  // somebody else could do it
-  }
-  ++stage.failures;
-  ShardTrouble& trouble = stage.troubles[shard];
-  ++trouble.failures;
-  trouble.workers.insert(attempt.worker);
-  std::set<std::string>& same = trouble.messages[failure.message];
-  same.insert(attempt.worker);
-  trouble.retry_at = now + std::chrono::milliseconds(settings_.retry_ms) *
-                               (1 << std::min(trouble.failures - 1, 10U));
-  actions.failures.push_back(
-      {job.id, stage.name, shard, attempt.worker, failure.message, TroubleKind::kFailed});
-  const bool is_quarantined =
-      trouble.failures >= settings_.failure_limit || same.size() >= settings_.same_error_limit;
-  if (is_quarantined) {
-    job.error = in_words(stage, shard) + " is quarantined after " +
-                std::to_string(trouble.failures) + " failures on " +
-                std::to_string(trouble.workers.size()) + " workers: " + failure.message;
-    end_job(job, JobPhase::kFailed, now, actions);
-  }
-}
-
-// A resource is short on that worker: the stage stays away from it for a while.
-void Queue::back_off(const Attempt& attempt, const std::string& worker, Time now) {
-  Backoff& backoff = find_job(attempt.job)->stages[attempt.stage].backoffs[worker];
-  backoff.step_ms = backoff.step_ms == 0 ? settings_.short_ms
-                                         : std::min(backoff.step_ms * 2, settings_.short_limit_ms);
-  backoff.until = now + std::chrono::milliseconds(backoff.step_ms);
 }
 
 void Queue::sample_rate(std::uint64_t order, Time now) {
   JobState& job = jobs_.at(order);
   for (StageState& stage : job.stages) {
-    if (stage.is_done()) {
+    const bool is_recent = stage.rate.size() > 1 && now - stage.rate.back().at < kRateStep;
+    if (stage.is_done() || is_recent) {
       continue;
     }
     double shards = static_cast<double>(stage.done);
     for (const std::uint64_t id : stage.attempts) {
       const Attempt& attempt = attempts_.at(id);
-      shards += static_cast<double>(std::min(attempt.shards_done, attempt.shards));
+      if (attempt.purpose == Purpose::kFirst) {
+        shards += static_cast<double>(std::min(attempt.shards_done, attempt.shards));
+      }
     }
+    shards = std::min(shards, static_cast<double>(stage.shards.size()));
     if (!stage.rate.empty() && stage.rate.back().at == now) {
       stage.rate.back().shards = shards;
     } else {

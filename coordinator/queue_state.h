@@ -1,34 +1,37 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/queue_events.h"
+#include "coordinator/queue_ranges.h"
+#include "coordinator/queue_verdicts.h"
 
 // What the queue remembers. Values only: a copy is a snapshot.
 
 namespace weft::coordinator {
 
-enum class ShardState : std::uint8_t { kPending, kRunning, kDone };
-
-// What went wrong with one shard so far. A shard in trouble is run alone.
-struct ShardTrouble {
-  std::uint32_t failures = 0;
-  std::uint32_t losses = 0;         // workers lost while they held it
-  std::uint32_t lonely_losses = 0;  // ... in a run of its own
-  Time retry_at{};
-  std::set<std::string> workers;                          // on which it failed
-  std::map<std::string, std::set<std::string>> messages;  // error -> workers
+enum class ShardState : std::uint8_t {
+  kPending,
+  kRunning,
+  kElsewhere,  // equal work of another job is running; its result will be this one's too
+  kDone,
+  kQuarantined,  // given up, unless a result comes all the same
 };
 
+// Why a worker gets nothing of a stage for a while.
 struct Backoff {
   Time until{};
-  std::uint32_t step_ms = 0;
+  std::uint32_t step_ms = 0;   // of the last wait for a resource; 0: there was none
+  std::uint32_t failures = 0;  // in a row
+  bool is_short = false;       // a resource is short; else it failed again and again
 };
 
 // How far a stage was at a time, running shards' shares included.
@@ -37,26 +40,57 @@ struct RateSample {
   double shards = 0;
 };
 
+// Shards whose run was lost with its worker are given in shorter and shorter runs, so that one that
+// kills its workers is found: at most so many shards after the first loss, the second, the third.
+inline constexpr std::array<std::uint64_t, 3> kSuspectRunShards = {256, 16, 1};
+
 struct StageState {
   StageName name = StageName::kGeometry;
+  core::Digest scene;
+  std::uint64_t memory_bytes = 0;
   std::vector<core::Digest> digests;
   std::vector<ShardState> shards;
-  std::vector<core::Digest> results;  // where done
-  std::uint64_t done = 0;             // cached ones included
+  std::vector<core::Digest> results;   // where done
+  std::vector<std::uint32_t> authors;  // of the results: Queue::author_name
+  std::uint64_t done = 0;              // cached ones included
   std::uint64_t cached = 0;
   std::uint64_t running = 0;
+  std::uint64_t elsewhere = 0;
+  std::uint64_t quarantined = 0;
   std::uint64_t failures = 0;
-  std::uint64_t first_pending = 0;  // no shard below is pending
-  std::map<std::uint64_t, ShardTrouble> troubles;
-  std::set<std::uint64_t> attempts;         // live ones
-  std::map<std::string, Backoff> backoffs;  // by worker
+
+  // Each pending shard is in one of these: without any trouble; in a run that was lost, by how
+  // often; failed, by when it may be tried again; lost alone, by how often.
+  ShardRanges fresh;
+  std::array<ShardRanges, kSuspectRunShards.size()> suspects;
+  std::set<std::pair<Time, std::uint64_t>> retries;
+  std::set<std::pair<std::size_t, std::uint64_t>> deadly;
+
+  std::map<std::uint64_t, ShardTrouble> troubles;  // of shards that are not done
+  std::map<std::uint64_t, std::uint32_t> doubled;  // running shards: further attempts that run them
+  std::set<std::uint64_t> attempts;                // live ones
+
+  // Done shards whose result another worker is to confirm: by the author of the result, those that
+  // wait for it, and those that are running; how often it could not be done; and those of which two
+  // results differ.
+  std::map<std::uint32_t, ShardRanges> audits;
+  ShardRanges auditing;
+  std::map<std::uint64_t, std::uint32_t> audit_failures;
+  std::set<std::uint64_t> disputed;
+  Time audits_possible_at{};  // when there last was a worker that can do them
+
+  std::map<std::string, Backoff> backoffs;  // by worker's id
   double shard_thread_ms = 0;               // measured work of a shard on one thread; 0: unknown
   std::deque<RateSample> rate;
   Time started_at{};
   Time ended_at{};
 
   [[nodiscard]] bool is_done() const { return done == shards.size(); }
-  [[nodiscard]] std::uint64_t pending() const { return shards.size() - done - running; }
+  [[nodiscard]] std::uint64_t pending() const {
+    return shards.size() - done - running - elsewhere - quarantined;
+  }
+  // Done shards that are not to be relied on yet.
+  [[nodiscard]] std::uint64_t unconfirmed() const;
 };
 
 enum class JobPhase : std::uint8_t {
@@ -68,18 +102,6 @@ enum class JobPhase : std::uint8_t {
   kCancelled
 };
 
-// A shard that its job gave up, or of which two workers gave different results.
-struct Trouble {
-  enum class Kind : std::uint8_t { kQuarantined, kKiller, kMismatch };
-  Kind kind = Kind::kQuarantined;
-  StageName stage = StageName::kGeometry;
-  std::uint64_t shard = 0;
-  std::string message;               // in words: what, how often, where
-  std::vector<std::string> workers;  // names of those concerned, sorted
-  std::uint64_t attempt = 0;         // the last one, for its log; 0: unknown
-  std::string liar;                  // of a mismatch: who was wrong, when that is known
-};
-
 struct JobState {
   std::string id;
   std::string fabric;
@@ -87,12 +109,16 @@ struct JobState {
   std::optional<core::Digest> fingerprint;
   Time served_at{};              // when a worker of its fingerprint was last there
   std::uint32_t generation = 0;  // counts beginnings: answers to older ones are dropped
+  std::uint32_t results_lost = 0;
   bool planning = false;
   bool plan_again = false;  // something ended since the plan that is being made was asked for
+  bool is_planned = false;  // nothing is left to plan; it is committed when all is confirmed
   std::vector<StageState> stages;  // in the order they were planned
   std::string error;
   JobDemands demands;
   bool is_paused = false;
+  bool is_ready = false;  // it has something for a worker
+  Time waiting_since{};   // when it was last given work, or had some again
   Time submitted_at{};
   Time started_at{};
   Time ended_at{};
@@ -110,6 +136,8 @@ struct JobState {
     return phase == JobPhase::kSucceeded || phase == JobPhase::kFailed ||
            phase == JobPhase::kCancelled;
   }
+  [[nodiscard]] std::uint64_t quarantined() const;
+  [[nodiscard]] std::uint64_t unconfirmed() const;
 };
 
 struct Attempt {
@@ -124,11 +152,14 @@ struct Attempt {
   std::string token;
   Time lease_until{};
   Time began_at{};
+  Time active_at{};  // since when its worker has nothing older to do; the epoch: it has
   // As its worker says.
   std::uint64_t shards_done = 0;
   std::uint64_t progress = 0;
   Time progress_at{};  // when one of these two last changed
   std::string last_line;
+  std::size_t losses = 0;  // of runs that these shards were in
+  double charged_ms = 0;   // to its job, in milliseconds of one thread
 };
 
 struct WorkerState {
@@ -138,6 +169,7 @@ struct WorkerState {
   std::uint64_t memory_bytes = 0;
   core::Digest fingerprint;
   Time seen_at{};
+  bool is_disconnected = false;
   std::uint64_t shards_done = 0;
   std::uint64_t failures = 0;
   std::vector<std::string> labels;
@@ -146,6 +178,32 @@ struct WorkerState {
   std::uint64_t superseded = 0;  // attempts of which it reported when they were no longer its own
   // Attempts about which all was said, for as long as the worker goes on naming them.
   std::set<std::uint64_t> settled;
+  // How it is counted in its pool.
+  bool is_counted = false;
+  bool is_counted_idle = false;
+};
+
+// The workers of one fingerprint that are there and not drained.
+struct WorkerPool {
+  std::uint64_t workers = 0;
+  std::uint64_t idle = 0;  // of these, those that run nothing
+  std::uint64_t idle_threads = 0;
+};
+
+// Different results of one deterministic shard, until most of those asked agree.
+struct Dispute {
+  struct Opinion {
+    std::string worker;  // name
+    core::Digest result;
+    std::uint64_t size_bytes = 0;
+  };
+  StageName stage = StageName::kGeometry;
+  std::vector<Opinion> opinions;  // the recorded one first
+  std::set<std::uint64_t> jobs;   // by order: those that use it
+  std::uint64_t attempt = 0;      // that will say more; 0: none runs
+  Time possible_at{};             // when there last was a worker that could be asked
+
+  [[nodiscard]] bool has_asked(const std::string& worker) const;
 };
 
 }  // namespace weft::coordinator

@@ -203,16 +203,17 @@ TEST(Queue, CancelledJob_StopsItsAttemptsAndLeavesTheOthersAlone) {
   EXPECT_TRUE(cluster.apply(CancelEvent{"a"}).ended.empty());
 }
 
-TEST(Queue, Workers_AreServedInTheOrderOfSubmission) {
+TEST(Queue, JobsOfOneUser_TakeTurnsInTheOrderOfSubmission) {
   QueueCluster cluster;
   QueueWorker worker(cluster, "w", 2);
   cluster.submit("b", {3});
   cluster.submit("a", {3});
-  worker.sync(3);
-  ASSERT_EQ(worker.held.size(), 3U);
+  worker.sync(4);
+  ASSERT_EQ(worker.held.size(), 4U);
   EXPECT_EQ(worker.held[0].job, "b");
-  EXPECT_EQ(worker.held[1].job, "b");
-  EXPECT_EQ(worker.held[2].job, "a");
+  EXPECT_EQ(worker.held[1].job, "a");
+  EXPECT_EQ(worker.held[2].job, "b");
+  EXPECT_EQ(worker.held[3].job, "a");
 }
 
 TEST(Queue, KnownResults_AreDoneAtOnce) {

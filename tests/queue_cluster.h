@@ -94,6 +94,11 @@ class QueueCluster {
   }
 
   void advance(std::uint64_t ms) {
+    constexpr std::uint64_t kTickMs = 5'000;
+    for (; ms > kTickMs; ms -= kTickMs) {
+      now += Ms(kTickMs);
+      apply(TickEvent{});
+    }
     now += Ms(ms);
     apply(TickEvent{});
   }
