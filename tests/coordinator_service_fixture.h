@@ -58,6 +58,7 @@ class ServiceTest : public testing::Test {
     options.state_folder = folder_ / "state";
     options.commit = fake_commit;
     options.queue.retry_ms = 1;
+    configure(options);
     scheduler_ = std::make_unique<Scheduler>(std::move(options), core::system_clock());
     server_ = std::make_unique<Server>(*scheduler_, "127.0.0.1:0");
     channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
@@ -65,6 +66,7 @@ class ServiceTest : public testing::Test {
     blobs_ = v1::BlobService::NewStub(channel_);
     catalogue_ = v1::CatalogueService::NewStub(channel_);
   }
+  virtual void configure(SchedulerOptions& /*options*/) {}
   void stop() {
     server_.reset();
     scheduler_.reset();
