@@ -163,7 +163,10 @@ bool is_this_version(const std::filesystem::path& path, const v1::Version& versi
   }
   try {
     return storage::verify_database(path) == version_digest(version);
-  } catch (const core::Error&) {
+  } catch (const core::Error& error) {
+    if (error.code() != core::Code::kDataLoss && error.code() != core::Code::kNotFound) {
+      throw;  // it could not be checked: that says nothing about the file
+    }
     return false;
   }
 }

@@ -1,175 +1,142 @@
 #include <algorithm>
+#include <string>
+#include <string_view>
 #include <tuple>
+#include <vector>
 
 #include "core/error.h"
-#include "core/half.h"
-#include "storage/database_fields.h"
-#include "storage/h5.h"
-#include "storage/light_tables.h"
+#include "core/file.h"
+#include "core/input_file.h"
+#include "core/sandbox.h"
+#include "storage/database_contents.h"
+#include "storage/database_parser.h"
+#include "storage/database_schema.h"
+#include "storage/database_summary.h"
+#include "storage/fabric_database.h"
+#include "storage/flat_database.h"
+#include "storage/h5_reader.h"
 #include "storage/user_block.h"
 
 namespace weft::storage {
 
 namespace {
 
-// Fills every field from a file.
-class FieldReader {
- public:
-  explicit FieldReader(const std::filesystem::path& path) : file_(path) {}
-
-  template <class T>
-  void values(const char* path, T* first) {
-    const DatasetSpec& spec = dataset_spec(path);
-    const std::vector<T> data = take<T>(spec, info_of(spec));
-    std::copy(data.begin(), data.end(), first);
-  }
-
-  template <class T>
-  void array(const char* path, std::vector<T>& data) {
-    const DatasetSpec& spec = dataset_spec(path);
-    data = take<T>(spec, info_of(spec));
-  }
-
-  template <class Member>
-  void columns(const char* path, std::vector<shading::FibreMaterial>& materials, Member member) {
-    const DatasetSpec& spec = dataset_spec(path);
-    const std::vector<float> data = take<float>(spec, info_of(spec));
-    materials.resize(extents_.at("materials"));
-    const std::size_t width = data.size() / materials.size();
-    for (std::size_t i = 0; i < materials.size(); ++i) {
-      std::copy_n(data.data() + i * width, width, member(materials[i]));
-    }
-  }
-
-  // Floats that may be stored as halves.
-  void rounded(const char* path, std::vector<float>& data) {
-    const DatasetSpec& spec = dataset_spec(path);
-    const h5::Reader::Info info = info_of(spec, h5::Element::kF32);
-    if (info.element == h5::Element::kF32) {
-      data = take<float>(spec, info);
-      return;
-    }
-    const std::vector<std::uint16_t> halves = take<std::uint16_t>(spec, info);
-    data.resize(halves.size());
-    for (std::size_t i = 0; i < halves.size(); ++i) {
-      data[i] = core::float_from_half(halves[i]);
-    }
-  }
-
-  void derived(const char* path) {
-    std::vector<float> unused;
-    array(path, unused);
-  }
-
-  void texts(const char* path, std::vector<std::string>& data) {
-    const DatasetSpec& spec = dataset_spec(path);
-    std::ignore = info_of(spec);
-    data = file_.read_text(path);
-  }
-
-  void text(const char* path, std::string& data) {
-    std::vector<std::string> one;
-    texts(path, one);
-    data = std::move(one.front());
-  }
-
-  [[nodiscard]] const Extents& extents() const { return extents_; }
-
- private:
-  h5::Reader::Info info_of(const DatasetSpec& spec) { return info_of(spec, spec.element); }
-
-  // Shape and element as the schema says; `other` is accepted as well.
-  h5::Reader::Info info_of(const DatasetSpec& spec, h5::Element other) {
-    h5::Reader::Info info = file_.info(spec.path);
-    if (info.element != spec.element && info.element != other) {
-      throw core::Error(core::Code::kDataLoss, std::string("dataset ") + spec.path +
-                                                   " has elements " + h5::to_string(info.element) +
-                                                   " where " + h5::to_string(spec.element) +
-                                                   " was expected; fetch or make the file again");
-    }
-    extents_.bind(spec, info.shape);
-    return info;
-  }
-
-  template <class T>
-  std::vector<T> take(const DatasetSpec& spec, const h5::Reader::Info& info) {
-    std::size_t count = 1;
-    for (const std::uint64_t extent : info.shape) {
-      count *= extent;
-    }
-    file_.admit(spec.path, info);
-    std::vector<T> data(count);
-    file_.read(spec.path, info, std::as_writable_bytes(std::span<T>(data)));
-    return data;
-  }
-
-  h5::Reader file_;
-  Extents extents_;
-};
-
-FabricDatabase read_contents(const std::filesystem::path& path) {
-  FabricDatabase database;
-  FieldReader reader(path);
-  exchange_fields(reader, database);
-  const std::uint64_t bands = reader.extents().at("bands");
-  if (bands > kMaxShOrder + 1 || bands * bands != reader.extents().at("coefficients")) {
-    throw core::Error(core::Code::kDataLoss,
-                      "dataset /iirtf/transfer is wrong: its number of coefficients does not fit "
-                      "the bands of /sg/zonal; fetch or make the file again");
-  }
-  database.sh_order = static_cast<std::uint32_t>(bands - 1);
-  database.visibility_resolution = static_cast<std::uint32_t>(reader.extents().at("resolution"));
-  database.pca_components = static_cast<std::uint32_t>(reader.extents().at("components"));
-  database.sg_count = static_cast<std::uint32_t>(reader.extents().at("sg_count"));
-  check_values(database);
-  return database;
+UserBlock user_block_of(const core::InputFile& file) {
+  return parse_user_block(file.read(0, kUserBlockBytes), file.size_bytes(), file.name());
 }
 
-// The library's readers of damaged metadata are not to be trusted: nothing reaches them before the
-// digest holds.
-core::Digest check_digest(const std::filesystem::path& path) {
-  const UserBlock block = read_user_block(path);
-  if (core::digest_of_file(path, kUserBlockBytes) != block.digest) {
+// Nothing reaches a parser before the digest holds.
+core::Digest check_digest(const core::InputFile& file) {
+  const UserBlock block = user_block_of(file);
+  if (file.digest(kUserBlockBytes) != block.digest) {
     throw core::Error(core::Code::kDataLoss,
-                      path.string() +
+                      file.name() +
                           " is damaged: its bytes do not have the digest it was written with; "
                           "fetch or make it again");
   }
   return block.digest;
 }
 
+// Chunks while they are unfolded, the largest dataset, and the file itself.
+core::SandboxLimits limits_for(std::uint64_t file_bytes) {
+  constexpr std::uint64_t kSlowestBytesPerSecond = std::uint64_t{8} << 20;
+  constexpr std::uint64_t kStartSeconds = 10;
+  constexpr std::uint64_t kFormBytes = std::uint64_t{1} << 20;
+  const std::uint64_t decoded_bytes = h5::decoded_limit_bytes(file_bytes);
+  core::SandboxLimits limits;
+  limits.memory_bytes = file_bytes + decoded_bytes + 4 * h5::kChunkLimitBytes;
+  limits.answer_bytes = decoded_bytes + kFormBytes;
+  limits.cpu_s = kStartSeconds + decoded_bytes / kSlowestBytesPerSecond;
+  return limits;
+}
+
+core::SandboxAnswer flattened(const core::InputFile& file, Flattened what) {
+  return core::read_in_sandbox(
+      file, {kDatabaseRequest, what == Flattened::kArrays ? kArraysRequest : kShapesRequest},
+      limits_for(file.size_bytes()));
+}
+
+FabricDatabase read_checked(const core::InputFile& file) {
+  const core::SandboxAnswer answer = flattened(file, Flattened::kArrays);
+  FlatDatabase source(answer.bytes(), Flattened::kArrays);
+  return read_contents(source);
+}
+
 template <class Function>
-auto naming_file(const std::filesystem::path& path, Function function) {
+auto naming_file(const std::string& name, Function function) {
   try {
     return function();
   } catch (const core::Error& error) {
     const std::string what = error.what();
-    if (what.find(path.string()) != std::string::npos) {
+    if (what.find(name) != std::string::npos) {
       throw;
     }
-    throw core::Error(error.code(), path.string() + ": " + what);
+    throw core::Error(error.code(), name + ": " + what);
   }
 }
 
 }  // namespace
 
 FabricDatabase read_database(const std::filesystem::path& path) {
-  return naming_file(path, [&path] {
-    check_digest(path);
-    return read_contents(path);
+  return naming_file(path.string(), [&path] {
+    const core::InputFile file(path);
+    check_digest(file);
+    return read_checked(file);
   });
 }
 
 core::Digest verify_database(const std::filesystem::path& path) {
-  return naming_file(path, [&path] {
-    const core::Digest digest = check_digest(path);
-    std::ignore = read_contents(path);
+  return naming_file(path.string(), [&path] {
+    const core::InputFile file(path);
+    const core::Digest digest = check_digest(file);
+    std::ignore = read_checked(file);
     return digest;
   });
 }
 
 core::Digest content_digest(const std::filesystem::path& path) {
-  return read_user_block(path).digest;
+  return user_block_of(core::InputFile(path)).digest;
+}
+
+std::vector<StoredDataset> stored_datasets(const std::filesystem::path& path) {
+  return naming_file(path.string(), [&path] {
+    const core::InputFile file(path);
+    check_digest(file);
+    const core::SandboxAnswer answer = flattened(file, Flattened::kShapes);
+    FlatDatabase source(answer.bytes(), Flattened::kShapes);
+    Extents extents;
+    std::vector<StoredDataset> datasets;
+    for (const DatasetSpec& spec : dataset_specs()) {
+      const DatasetSource::Info info = source.info(spec.path);
+      extents.bind(spec, info.shape);
+      datasets.push_back({spec.path, h5::to_string(info.element), info.shape, info.stored_bytes});
+    }
+    return datasets;
+  });
+}
+
+std::vector<StoredChunk> stored_chunks(const std::filesystem::path& path) {
+  return naming_file(path.string(), [&path] {
+    const core::InputFile file(path);
+    check_digest(file);
+    const core::SandboxAnswer answer = flattened(file, Flattened::kShapes);
+    FlatDatabase source(answer.bytes(), Flattened::kShapes);
+    const std::uint64_t body_bytes = file.size_bytes() - kUserBlockBytes;
+    std::vector<StoredChunk> chunks;
+    for (const DatasetSpec& spec : dataset_specs()) {
+      for (const DatasetSource::Extent& extent : source.chunks(spec.path)) {
+        if (extent.offset > body_bytes || extent.size_bytes > body_bytes - extent.offset) {
+          throw core::Error(core::Code::kDataLoss, std::string("dataset ") + spec.path +
+                                                       " has chunks that lie outside the file; "
+                                                       "fetch or make it again");
+        }
+        chunks.push_back({extent.offset + kUserBlockBytes, extent.size_bytes});
+      }
+    }
+    std::sort(chunks.begin(), chunks.end(),
+              [](const StoredChunk& a, const StoredChunk& b) { return a.offset < b.offset; });
+    return chunks;
+  });
 }
 
 }  // namespace weft::storage

@@ -4,9 +4,6 @@
 #include <cmath>
 
 #include "core/half.h"
-#include "storage/database_schema.h"
-#include "storage/h5.h"
-#include "storage/user_block.h"
 
 namespace weft::storage {
 
@@ -21,29 +18,6 @@ double root_mean_square(const std::vector<float>& values) {
 }
 
 }  // namespace
-
-std::vector<StoredDataset> stored_datasets(const std::filesystem::path& path) {
-  const h5::Reader reader(path);
-  std::vector<StoredDataset> datasets;
-  for (const DatasetSpec& spec : dataset_specs()) {
-    const h5::Reader::Info info = reader.info(spec.path);
-    datasets.push_back({spec.path, h5::to_string(info.element), info.shape, info.stored_bytes});
-  }
-  return datasets;
-}
-
-std::vector<StoredChunk> stored_chunks(const std::filesystem::path& path) {
-  const h5::Reader reader(path);
-  std::vector<StoredChunk> chunks;
-  for (const DatasetSpec& spec : dataset_specs()) {
-    for (const h5::Reader::Extent& extent : reader.chunks(spec.path)) {
-      chunks.push_back({extent.offset + kUserBlockBytes, extent.size_bytes});
-    }
-  }
-  std::sort(chunks.begin(), chunks.end(),
-            [](const StoredChunk& a, const StoredChunk& b) { return a.offset < b.offset; });
-  return chunks;
-}
 
 DatabaseErrors database_errors(const FabricDatabase& database) {
   DatabaseErrors errors;

@@ -17,8 +17,7 @@ struct StoredDataset {
   std::uint64_t stored_bytes = 0;  // after compression
 };
 
-// All datasets of the schema, in its order. Throws as read_database, but checks no digest:
-// REQUIRES: the file was verified.
+// All datasets of the schema, in its order. Throws as read_database.
 [[nodiscard]] std::vector<StoredDataset> stored_datasets(const std::filesystem::path& path);
 
 // Where stored bytes of datasets lie in the file.
@@ -27,8 +26,7 @@ struct StoredChunk {
   std::uint64_t size_bytes = 0;
 };
 
-// The chunks of all datasets, by offset. Throws as stored_datasets. REQUIRES: the file was
-// verified.
+// The chunks of all datasets, by offset. Throws as stored_datasets.
 [[nodiscard]] std::vector<StoredChunk> stored_chunks(const std::filesystem::path& path);
 
 // How exact the transfer matrices and the visibility are.

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-// HDF5, as far as fabric databases need it: the only file pair that knows the library. Files are
-// made in memory and are the same bytes for the same calls; files are read with limits and nothing
-// in them is followed out of them. The library is not safe for threads: whoever holds a writer or a
-// reader holds its lock, others wait.
+// HDF5, as far as fabric databases need it: the files storage/h5*.cpp alone know the library. Files
+// are made in memory and are the same bytes for the same calls; files are read with limits and
+// nothing in them is followed out of them (storage/h5_reader.h). The library is not safe for
+// threads: whoever holds a writer or a reader holds its lock, others wait.
 
 namespace weft::storage::h5 {
 
@@ -85,45 +85,5 @@ class ImageWriter {
   std::uint64_t user_block_bytes_;
   Handle file_;
 };
-
-// Reads a file that may be hostile: refuses links out of the file, external and virtual storage,
-// foreign filters, and shapes that the file is too small to hold. Throws core::Error(kDataLoss)
-// naming the dataset, kNotFound when the file cannot be opened, kResourceExhausted when everything
-// asked for so far exceeds kReadLimitBytes.
-class Reader {
- public:
-  explicit Reader(const std::filesystem::path& path);
-
-  struct Info {
-    Element element = Element::kF32;
-    Shape shape;
-    std::uint64_t element_bytes = 0;  // of kText: the fixed length
-    std::uint64_t stored_bytes = 0;   // after compression
-  };
-  [[nodiscard]] Info info(const std::string& path) const;
-  // Counts a dataset against the limits, before memory is taken for it.
-  void admit(const std::string& path, const Info& info);
-  // REQUIRES: `info` is this dataset's and admitted, `out` has the size its shape needs.
-  void read(const std::string& path, const Info& info, std::span<std::byte> out) const;
-  [[nodiscard]] std::vector<std::string> read_text(const std::string& path);
-  // Where the dataset's chunks are stored: offsets behind the user block.
-  struct Extent {
-    std::uint64_t offset = 0;
-    std::uint64_t size_bytes = 0;
-  };
-  [[nodiscard]] std::vector<Extent> chunks(const std::string& path) const;
-  [[nodiscard]] std::uint64_t file_bytes() const { return file_bytes_; }
-
- private:
-  [[nodiscard]] Handle open(const std::string& path) const;
-
-  Session session_;
-  std::uint64_t file_bytes_ = 0;
-  std::uint64_t decoded_bytes_ = 0;
-  std::uint64_t claimed_bytes_ = 0;
-  Handle file_;
-};
-
-inline constexpr std::uint64_t kReadLimitBytes = std::uint64_t{8} << 30;
 
 }  // namespace weft::storage::h5

@@ -8,7 +8,6 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "storage/database_summary.h"
-#include "storage/user_block.h"
 
 namespace weft::storage {
 
@@ -101,17 +100,18 @@ void PieceCutter::finish() {
 std::vector<std::uint64_t> piece_boundaries(const std::filesystem::path& database) {
   std::vector<std::uint64_t> boundaries;
   try {
-    if (core::digest_of_file(database, kUserBlockBytes) != read_user_block(database).digest) {
-      return {};
-    }
     for (const StoredChunk& chunk : stored_chunks(database)) {
       if (chunk.size_bytes >= kPieceAloneBytes) {
         boundaries.push_back(chunk.offset);
         boundaries.push_back(chunk.offset + chunk.size_bytes);
       }
     }
-  } catch (const core::Error&) {
-    return {};
+  } catch (const core::Error& error) {
+    if (error.code() == core::Code::kDataLoss || error.code() == core::Code::kFailedPrecondition ||
+        error.code() == core::Code::kNotFound) {
+      return {};
+    }
+    throw;
   }
   std::sort(boundaries.begin(), boundaries.end());
   return boundaries;

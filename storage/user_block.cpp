@@ -1,7 +1,6 @@
 #include "storage/user_block.h"
 
 #include <charconv>
-#include <fstream>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -51,22 +50,12 @@ std::string encode_user_block(const UserBlock& block) {
   return text;
 }
 
-UserBlock read_user_block(const std::filesystem::path& path) {
-  std::error_code failure;
-  const std::uint64_t file_bytes = std::filesystem::file_size(path, failure);
-  std::ifstream in(path, std::ios::binary);
-  if (failure || !in) {
-    throw core::Error(core::Code::kNotFound,
-                      "cannot read " + path.string() + ": " +
-                          (failure ? failure.message() : std::string("not allowed")));
-  }
-  std::string bytes(kUserBlockBytes, '\0');
-  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(in.gcount()));
+UserBlock parse_user_block(std::string_view bytes, std::uint64_t file_bytes,
+                           const std::string& name) {
   std::string_view rest = bytes;
   if (!rest.starts_with(kTitle)) {
     throw core::Error(core::Code::kDataLoss,
-                      path.string() +
+                      name +
                           " is not a fabric database, or its first bytes are damaged; make one "
                           "with weft run or weft fetch");
   }
@@ -77,19 +66,19 @@ UserBlock read_user_block(const std::filesystem::path& path) {
   const auto digest = hex ? core::Digest::from_hex(*hex) : std::nullopt;
   if (!schema || !stated_bytes || !digest ||
       encode_user_block({*schema, *stated_bytes, *digest}) != bytes) {
-    throw core::Error(core::Code::kDataLoss, path.string() +
+    throw core::Error(core::Code::kDataLoss, name +
                                                  " is damaged: its first 512 bytes are not as "
                                                  "written; fetch or make it again");
   }
   if (*schema != kDatabaseSchema) {
     throw core::Error(core::Code::kFailedPrecondition,
-                      path.string() + " has schema " + std::to_string(*schema) +
+                      name + " has schema " + std::to_string(*schema) +
                           "; this program reads schema " + std::to_string(kDatabaseSchema) +
                           ": use a newer weft");
   }
   if (*stated_bytes != file_bytes) {
     throw core::Error(core::Code::kDataLoss,
-                      path.string() + " is damaged: it has " + std::to_string(file_bytes) +
+                      name + " is damaged: it has " + std::to_string(file_bytes) +
                           " bytes and was written with " + std::to_string(*stated_bytes) +
                           "; fetch or make it again");
   }

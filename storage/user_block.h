@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "core/digest.h"
 
@@ -27,10 +27,11 @@ struct UserBlock {
 // Exactly kUserBlockBytes bytes.
 [[nodiscard]] std::string encode_user_block(const UserBlock& block);
 
-// Reads the user block of a file and checks that every byte of it is as encode_user_block writes
-// it, that the schema is one we know, and that the file has the size it states. Throws
-// core::Error(kNotFound) when the file cannot be read, kDataLoss when it is damaged or not a fabric
-// database, kFailedPrecondition when its schema is newer than this program.
-[[nodiscard]] UserBlock read_user_block(const std::filesystem::path& path);
+// Checks that `bytes`, the first kUserBlockBytes of a file, are every one as encode_user_block
+// writes them, that the schema is one we know, and that the file has the size it states. Throws
+// core::Error(kDataLoss) when it is damaged or not a fabric database, kFailedPrecondition when its
+// schema is newer than this program; `name` stands for the file in messages.
+[[nodiscard]] UserBlock parse_user_block(std::string_view bytes, std::uint64_t file_bytes,
+                                         const std::string& name);
 
 }  // namespace weft::storage

@@ -25,7 +25,7 @@ MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
 
 # Third-party header -> the files that alone include it.
 BEHIND = {
-    r"hdf5\.h|H5.*\.h": {"storage/h5.h", "storage/h5.cpp"},
+    r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_reader.cpp", "storage/h5_types.cpp"},
     r"embree3/.*": {"transport/scene.cpp", "render/triangle_scene.cpp"},
     r"(OpenEXR/)?Imf.*": {"render/image.cpp"},
     r"png\.h": {"render/png.cpp"},
