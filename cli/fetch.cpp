@@ -9,6 +9,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/fabric_reference.h"
+#include "cli/import_database.h"
 #include "cli/output_file.h"
 #include "cli/present.h"
 #include "cli/print_json.h"
@@ -23,11 +24,15 @@ constexpr const char* kHelp =
     "Bring a published version to a file.\n"
     "A fetch that was broken off goes on where it was (OUTPUT.DIGEST.part); the file is checked\n"
     "against its digest before it gets its name.\n"
-    "Example: weft fetch silk@latest -o silk.h5";
+    "With --import, a file from elsewhere takes the same way: it is copied, read whole by a\n"
+    "program that can do nothing else, and gets its name when everything in it is right.\n"
+    "Examples: weft fetch silk@latest -o silk.h5\n"
+    "          weft fetch --import from_a_friend.h5 -o linen.h5";
 
 struct FetchOptions {
   security::Endpoint coordinator;
   std::string reference;
+  std::string import;
   std::string output;
   bool wants_json = false;
 };
@@ -43,7 +48,27 @@ client::FetchReport terminal_report() {
   };
 }
 
+void run_import(const FetchOptions& options) {
+  if (!options.output.empty()) {
+    check_output_file(options.output);
+  }
+  const ImportedDatabase imported = import_database(options.import, options.output);
+  if (options.wants_json) {
+    print_json({{"output", imported.path.string()},
+                {"imported", options.import},
+                {"size_bytes", imported.size_bytes},
+                {"content_digest", imported.digest.hex()}});
+    return;
+  }
+  fmt::print("{}: {} is whole, {}, content {}\n", imported.path.string(), options.import,
+             format_bytes(imported.size_bytes), imported.digest.hex());
+}
+
 void run(const FetchOptions& options) {
+  if (!options.import.empty()) {
+    run_import(options);
+    return;
+  }
   Client connection(options.coordinator);
   const v1::Version version = client::find_version(connection, options.reference);
   const std::string output =
@@ -68,18 +93,28 @@ void run(const FetchOptions& options) {
 void add_fetch(CLI::App& app) {
   auto options = std::make_shared<FetchOptions>();
   CLI::App* command = add_command(app, "fetch", kHelp);
-  command->add_option("reference", options->reference, "silk, silk@3 or silk@latest")
-      ->required()
-      ->check([](const std::string& text) {
-        return parse_reference(text)
-                   ? std::string()
-                   : "'" + text + "' is not a version; write NAME, NAME@NUMBER or NAME@latest";
-      });
+  CLI::Option* const reference =
+      command->add_option("reference", options->reference, "silk, silk@3 or silk@latest");
+  CLI::Option* const import =
+      command->add_option("--import", options->import,
+                          "Database file to take in, in place of a published version; without -o "
+                          "it is kept among fetched fabrics");
+  import->excludes(reference);
+  reference->check([](const std::string& text) {
+    return parse_reference(text)
+               ? std::string()
+               : "'" + text + "' is not a version; write NAME, NAME@NUMBER or NAME@latest";
+  });
   command->add_option("-o,--output", options->output,
                       "Database to write; default: NAME@NUMBER.h5 in this folder");
   add_coordinator_option(*command, options->coordinator);
   command->add_flag("--json", options->wants_json, "Print one JSON value on stdout");
-  command->callback([options] { run(*options); });
+  command->callback([options] {
+    if (options->reference.empty() && options->import.empty()) {
+      throw CLI::RequiredError("a version (NAME, NAME@NUMBER) or --import FILE");
+    }
+    run(*options);
+  });
 }
 
 }  // namespace weft::cli

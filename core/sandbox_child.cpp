@@ -43,7 +43,7 @@ constexpr std::uint64_t kWallPerCpu = 20;
 constexpr int kAllowed[] = {SYS_read,      SYS_pread64,      SYS_write,         SYS_lseek,
                             SYS_munmap,    SYS_mremap,       SYS_brk,           SYS_madvise,
                             SYS_getrandom, SYS_rt_sigreturn, SYS_clock_gettime, SYS_gettimeofday,
-                            SYS_futex,     SYS_exit,         SYS_exit_group};
+                            SYS_futex,     SYS_sysinfo,      SYS_exit,          SYS_exit_group};
 
 constexpr sock_filter load(std::uint32_t offset) {
   return BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offset);

@@ -1,32 +1,28 @@
 #include "render/image.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <exception>
-#include <limits>
 #include <string_view>
 #include <utility>
 
-#include <ImathBox.h>
-#include <OpenEXR/ImfArray.h>
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
-#include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
-#include <OpenEXR/ImfThreading.h>
 
 #include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/input_file.h"
+#include "core/sandbox.h"
+#include "render/files/exr_parser.h"
 
 namespace weft::render {
 namespace {
 
-constexpr std::uint64_t kFileLimitBytes = std::uint64_t{4} << 30;
 constexpr const char* kColourChannels[] = {"R", "G", "B"};
 
 // OpenEXR writes into memory, so that the file appears on disk whole or not at all.
@@ -45,26 +41,6 @@ class MemoryOutput : public Imf::OStream {
 
  private:
   std::string bytes_;
-  std::size_t position_ = 0;
-};
-
-class MemoryInput : public Imf::IStream {
- public:
-  explicit MemoryInput(std::string_view bytes) : Imf::IStream("memory"), bytes_(bytes) {}
-  bool read(char data[], int size) override {
-    const auto count = static_cast<std::size_t>(size);
-    if (position_ > bytes_.size() || count > bytes_.size() - position_) {
-      throw core::Error(core::Code::kDataLoss, "the file ends too early");
-    }
-    std::memcpy(data, bytes_.data() + position_, count);
-    position_ += count;
-    return position_ < bytes_.size();
-  }
-  std::uint64_t tellg() override { return position_; }
-  void seekg(std::uint64_t position) override { position_ = position; }
-
- private:
-  std::string_view bytes_;
   std::size_t position_ = 0;
 };
 
@@ -132,66 +108,6 @@ std::vector<Plane> planes_of(const Image& image, bool halves) {
   return planes;
 }
 
-// The channels that the three colours of a layer are read from.
-std::array<std::string, 3> channels_for(const Imf::ChannelList& channels, std::string_view layer,
-                                        const std::string& file_name) {
-  const std::string prefix = layer.empty() ? "" : std::string(layer) + ".";
-  const auto has = [&](const char* name) {
-    return channels.findChannel((prefix + name).c_str()) != nullptr;
-  };
-  if (has("R") && has("G") && has("B")) {
-    return {prefix + "R", prefix + "G", prefix + "B"};
-  }
-  if (has("X") && has("Y") && has("Z")) {
-    return {prefix + "X", prefix + "Y", prefix + "Z"};
-  }
-  if (has("Y") && !has("RY")) {
-    return {prefix + "Y", prefix + "Y", prefix + "Y"};
-  }
-  std::string names;
-  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
-    names += names.empty() ? channel.name() : std::string(", ") + channel.name();
-  }
-  throw core::Error(
-      core::Code::kInvalidArgument,
-      file_name + ": the picture has the channels " + names +
-          (layer.empty() ? "; give one with the channels R, G, B or with Y alone"
-                         : "; none of them are colours of the layer '" + std::string(layer) + "'"));
-}
-
-Image read_from(MemoryInput& input, const std::string& name, std::string_view layer) {
-  Imf::InputFile file(input, 0);
-  const Imath::Box2i window = file.header().dataWindow();
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
-  const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-  if (width < 1 || height < 1 || width > kImageSideLimit || height > kImageSideLimit) {
-    throw core::Error(core::Code::kInvalidArgument,
-                      name + ": the picture is " + std::to_string(width) + " x " +
-                          std::to_string(height) + " pixels; at most " +
-                          std::to_string(kImageSideLimit) + " a side can be read");
-  }
-  Image image(static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height));
-  // One plane at a time: a frame buffer cannot name a channel twice, and grey fills all three.
-  const std::array<std::string, 3> names = channels_for(file.header().channels(), layer, name);
-  std::vector<float> plane(image.pixels.size());
-  for (std::size_t c = 0; c < 3; ++c) {
-    Imf::FrameBuffer buffer;
-    buffer.insert(names[c], Imf::Slice::Make(Imf::FLOAT, plane.data(), window));
-    file.setFrameBuffer(buffer);
-    file.readPixels(window.min.y, window.max.y);
-    for (std::size_t i = 0; i < plane.size(); ++i) {
-      image.pixels[i][static_cast<int>(c)] = plane[i];
-    }
-  }
-  for (auto attribute = file.header().begin(); attribute != file.header().end(); ++attribute) {
-    const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute.attribute());
-    if (text != nullptr) {
-      image.attributes[attribute.name()] = text->value();
-    }
-  }
-  return image;
-}
-
 }  // namespace
 
 void write_exr(const std::filesystem::path& path, const Image& image, ExrPixels pixels) {
@@ -220,24 +136,33 @@ void write_exr(const std::filesystem::path& path, const Image& image, ExrPixels 
   core::write_file_atomically(path, output.bytes());
 }
 
+namespace {
+
+Image read_apart(const core::InputFile& file, std::string_view layer) {
+  if (file.size_bytes() > kExrLimitBytes) {
+    throw core::Error(core::Code::kResourceExhausted,
+                      file.name() + " is larger than the limit of " +
+                          std::to_string(kExrLimitBytes) + " bytes of a picture");
+  }
+  const std::uint64_t pixels = exr_pixel_limit(file.size_bytes());
+  core::SandboxLimits limits;
+  // Three colours, the channel that is being read, and what OpenEXR unfolds at a time.
+  limits.memory_bytes = file.size_bytes() + pixels * 16 + (std::uint64_t{256} << 20);
+  limits.answer_bytes = file.size_bytes() + pixels * 12 + (std::uint64_t{1} << 20);
+  limits.cpu_s = 20 + pixels / (std::uint64_t{1} << 20);
+  const core::SandboxAnswer answer =
+      core::read_in_sandbox(file, {kExrRequest, file.name(), std::string(layer)}, limits);
+  return image_from(core::FlatReader(answer.bytes()));
+}
+
+}  // namespace
+
 Image read_exr(const std::filesystem::path& path, std::string_view layer) {
-  return read_exr_bytes(core::read_file(path, kFileLimitBytes), path.string(), layer);
+  return read_apart(core::InputFile(path), layer);
 }
 
 Image read_exr_bytes(std::string_view bytes, const std::string& name, std::string_view layer) {
-  MemoryInput input(bytes);
-  try {
-    return read_from(input, name, layer);
-  } catch (const core::Error& error) {
-    if (error.code() != core::Code::kDataLoss) {
-      throw;
-    }
-    throw core::Error(core::Code::kDataLoss, name + ": not a whole OpenEXR picture: " +
-                                                 error.what() + "; make or fetch it again");
-  } catch (const std::exception& error) {
-    throw core::Error(core::Code::kDataLoss,
-                      name + ": not an OpenEXR picture that can be read: " + error.what());
-  }
+  return read_apart(core::InputFile(bytes, name), layer);
 }
 
 }  // namespace weft::render

@@ -55,9 +55,10 @@ void write_exr(const std::filesystem::path& path, const Image& image,
                ExrPixels pixels = ExrPixels::kHalf);
 
 // Reads the channels R, G, B (or X, Y, Z, or Y alone, as grey) of a layer - none: the picture's
-// own - and all string attributes. Throws core::Error(kNotFound) when there is no such file,
-// kDataLoss when it is damaged, and kInvalidArgument when it has no such channels or a side exceeds
-// kImageSideLimit.
+// own - and all string attributes. OpenEXR sees the file in the sandbox alone (core/sandbox.h).
+// Throws core::Error(kNotFound) when there is no such file, kDataLoss when it is damaged,
+// kInvalidArgument when it has no such channels or a side exceeds kImageSideLimit, and
+// kResourceExhausted when it or its pixels exceed the limits of render/files/exr_parser.h.
 [[nodiscard]] Image read_exr(const std::filesystem::path& path, std::string_view layer = "");
 
 // The same from memory; `name` stands for the file in messages.

@@ -24,9 +24,10 @@ struct ObjMesh {
 inline constexpr std::size_t kTriangleLimit = 4'000'000;
 
 // Reads a Wavefront OBJ file; polygons are cut into triangles, triangles without area left out.
-// Throws core::Error: kNotFound when there is no such file, kInvalidArgument when it is no OBJ
-// file, a corner lacks texture coordinates, a number is not finite or there is no triangle, and
-// kResourceExhausted above kTriangleLimit.
+// The text is parsed in the sandbox (core/sandbox.h). Throws core::Error: kNotFound when there is
+// no such file, kInvalidArgument when it is no OBJ file, a corner lacks texture coordinates, a
+// number is not finite or beyond 1e9, or there is no triangle, and kResourceExhausted above
+// kTriangleLimit and the limits of render/files/obj_parser.h.
 [[nodiscard]] ObjMesh read_obj(const std::filesystem::path& path);
 
 // The same from memory; `name` stands for the file in messages.

@@ -10,6 +10,9 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/input_file.h"
+#include "core/sandbox.h"
+#include "render/files/png_parser.h"
 
 namespace weft::render {
 namespace {
@@ -60,91 +63,22 @@ class PngWriter {
   png_infop info_ = nullptr;
 };
 
-// What libpng reads from; its error callback finds the name here.
-struct PngSource {
-  std::string_view left;
-  const std::string& name;
-};
-
-[[noreturn]] void fail_reading(png_structp png, png_const_charp message) {
-  const auto* source = static_cast<const PngSource*>(png_get_error_ptr(png));
-  throw core::Error(core::Code::kDataLoss,
-                    source->name + " cannot be read as PNG: " + message + "; save it again");
-}
-
-void ignore_warning(png_structp, png_const_charp) {}
-
-void take(png_structp png, png_bytep data, png_size_t size) {
-  auto* source = static_cast<PngSource*>(png_get_io_ptr(png));
-  if (size > source->left.size()) {
-    png_error(png, "it ends early");
-  }
-  std::copy_n(source->left.begin(), size, data);
-  source->left.remove_prefix(size);
-}
-
-class PngReader {
- public:
-  PngReader(std::string_view bytes, const std::string& name)
-      : source_{bytes, name},
-        png_(
-            png_create_read_struct(PNG_LIBPNG_VER_STRING, &source_, fail_reading, ignore_warning)) {
-    CHECK(png_ != nullptr);
-    info_ = png_create_info_struct(png_);
-    CHECK(info_ != nullptr);
-    png_set_read_fn(png_, &source_, take);
-  }
-  ~PngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
-  PngReader(const PngReader&) = delete;
-  PngReader& operator=(const PngReader&) = delete;
-  PngReader(PngReader&&) = delete;
-  PngReader& operator=(PngReader&&) = delete;
-  [[nodiscard]] png_structp png() const { return png_; }
-  [[nodiscard]] png_infop info() const { return info_; }
-
- private:
-  PngSource source_;
-  png_structp png_ = nullptr;
-  png_infop info_ = nullptr;
-};
-
 }  // namespace
 
 PlainPicture read_plain_png(std::string_view bytes, const std::string& name,
                             std::uint32_t side_limit) {
-  PngReader reader(bytes, name);
-  const png_structp png = reader.png();
-  png_read_info(png, reader.info());
-  PlainPicture picture;
-  picture.width = png_get_image_width(png, reader.info());
-  picture.height = png_get_image_height(png, reader.info());
-  const png_byte type = png_get_color_type(png, reader.info());
-  picture.has_palette = type == PNG_COLOR_TYPE_PALETTE;
-  if ((type != PNG_COLOR_TYPE_PALETTE && type != PNG_COLOR_TYPE_GRAY &&
-       type != PNG_COLOR_TYPE_GRAY_ALPHA) ||
-      png_get_bit_depth(png, reader.info()) > 8) {
-    throw core::Error(core::Code::kInvalidArgument,
-                      name +
-                          " has colours of its own or more than 8 bits; save it as a PNG with a "
-                          "palette, or with 8-bit grey levels");
+  if (bytes.size() > kPngLimitBytes) {
+    throw core::Error(core::Code::kResourceExhausted, name + " is larger than the limit of " +
+                                                          std::to_string(kPngLimitBytes) +
+                                                          " bytes of such a picture");
   }
-  if (picture.width > side_limit || picture.height > side_limit) {
-    throw core::Error(
-        core::Code::kInvalidArgument,
-        name + " is too large; give at most " + std::to_string(side_limit) + " pixels a side");
-  }
-  png_set_packing(png);
-  png_set_strip_alpha(png);
-  const int passes = png_set_interlace_handling(png);
-  png_read_update_info(png, reader.info());
-  CHECK_EQ(png_get_rowbytes(png, reader.info()), std::size_t{picture.width});
-  picture.values.resize(std::size_t{picture.width} * picture.height);
-  for (int pass = 0; pass < passes; ++pass) {
-    for (std::uint32_t y = 0; y < picture.height; ++y) {
-      png_read_row(png, picture.values.data() + std::size_t{picture.width} * y, nullptr);
-    }
-  }
-  return picture;
+  const core::InputFile file(bytes, name);
+  const std::uint64_t pixels = std::uint64_t{side_limit} * side_limit;
+  const core::SandboxLimits limits{bytes.size() + 4 * pixels + (std::uint64_t{64} << 20),
+                                   pixels + (std::uint64_t{1} << 20), 20};
+  const core::SandboxAnswer answer =
+      core::read_in_sandbox(file, {kPngRequest, name, std::to_string(side_limit)}, limits);
+  return plain_picture_from(core::FlatReader(answer.bytes()), side_limit);
 }
 
 void write_png(const std::filesystem::path& path, std::uint32_t width, std::uint32_t height,

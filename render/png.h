@@ -25,9 +25,10 @@ struct PlainPicture {
   std::vector<std::uint8_t> values;  // [height, width], top row first
 };
 
-// Decodes a PNG with a palette, or a grey one of at most 8 bits. Throws core::Error: kDataLoss when
-// it is damaged or no PNG, kInvalidArgument when it has colours without a palette, more bits, or a
-// side beyond `side_limit`; `name` stands for it in messages.
+// Decodes a PNG with a palette, or a grey one of at most 8 bits, in the sandbox (core/sandbox.h).
+// Throws core::Error: kDataLoss when it is damaged or no PNG, kInvalidArgument when it has colours
+// without a palette, more bits, or a side beyond `side_limit`, kResourceExhausted above 64 MiB;
+// `name` stands for it in messages.
 [[nodiscard]] PlainPicture read_plain_png(std::string_view bytes, const std::string& name,
                                           std::uint32_t side_limit);
 

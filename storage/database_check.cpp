@@ -39,6 +39,15 @@ void require_finite_halves(const char* path, const std::vector<std::uint16_t>& h
   }
 }
 
+// Names are shown to people: nothing in them may steer a terminal.
+void require_plain(const char* path, const std::vector<std::string>& texts) {
+  for (const std::string& text : texts) {
+    require(std::none_of(text.begin(), text.end(),
+                         [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }),
+            path, "a text has control characters");
+  }
+}
+
 bool positive(float value) { return std::isfinite(value) && value > 0; }
 
 bool in_unit_interval(const glm::vec3& colour) {
@@ -47,6 +56,9 @@ bool in_unit_interval(const glm::vec3& colour) {
 }
 
 void check_exemplar(const FabricDatabase& db) {
+  require_plain("/exemplar/material_names", db.material_names);
+  require_plain("/exemplar/yarn_names", db.yarn_names);
+  require_plain("/provenance/software", {db.software});
   require(positive(db.size_mm.x) && positive(db.size_mm.y), "/exemplar/size_mm",
           "it is not positive and finite");
   require(std::isfinite(db.z_bounds_mm.x) && std::isfinite(db.z_bounds_mm.y) &&

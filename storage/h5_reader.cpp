@@ -119,7 +119,7 @@ struct Link {
   bool is_hard = false;
 };
 
-// Called by the library for each link of a group; stops it after kLinksLimit.
+// Called by the library for each link of a group; fails after kLinksLimit.
 herr_t take_link(hid_t, const char* name, const H5L_info_t* info, void* links) {
   auto& list = *static_cast<std::vector<Link>*>(links);
   list.push_back({name, info->type == H5L_TYPE_HARD});
@@ -167,12 +167,14 @@ void Reader::require_only(const std::set<std::string>& groups,
 void Reader::require_only_in(const std::string& group, const std::set<std::string>& groups,
                              const std::set<std::string>& datasets) const {
   const Handle opened(H5Gopen2(file_.id(), group.c_str(), H5P_DEFAULT));
+  H5G_info_t info{};
+  if (opened.id() >= 0 && H5Gget_info(opened.id(), &info) >= 0 && info.nlinks > kLinksLimit) {
+    throw_damaged(group, "is a group of more than " + std::to_string(kLinksLimit) + " entries");
+  }
   std::vector<Link> links;
   if (opened.id() < 0 ||
       H5Literate(opened.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, take_link, &links) != 0) {
-    throw_damaged(group, links.size() > kLinksLimit
-                             ? "is a group of more than " + std::to_string(kLinksLimit) + " entries"
-                             : std::string("is missing or no group"));
+    throw_damaged(group, "is missing or no group");
   }
   for (const Link& link : links) {
     const std::string path = (group == "/" ? "" : group) + "/" + link.name;

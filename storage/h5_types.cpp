@@ -89,9 +89,11 @@ std::pair<Element, std::uint64_t> element_of(Id dataset, const std::string& path
         return {element, H5Tget_size(type.id())};
       }
     }
-    if (H5Tget_class(type.id()) == H5T_STRING && H5Tis_variable_str(type.id()) == 0 &&
-        H5Tget_size(type.id()) > 0) {
-      return {Element::kText, H5Tget_size(type.id())};
+    if (H5Tget_class(type.id()) == H5T_STRING && H5Tis_variable_str(type.id()) == 0) {
+      const std::size_t length = H5Tget_size(type.id());
+      if (length > 0 && H5Tequal(type.id(), type_of(Element::kText, length).id()) > 0) {
+        return {Element::kText, length};
+      }
     }
   }
   throw_damaged(path, "has elements of a kind that fabric databases do not have");

@@ -27,11 +27,11 @@ MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
 BEHIND = {
     r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_reader.cpp", "storage/h5_types.cpp"},
     r"embree3/.*": {"transport/scene.cpp", "render/triangle_scene.cpp"},
-    r"(OpenEXR/)?Imf.*": {"render/image.cpp"},
-    r"png\.h": {"render/png.cpp"},
+    r"(OpenEXR/)?Imf.*": {"render/image.cpp", "render/files/exr_parser.cpp"},
+    r"png\.h": {"render/png.cpp", "render/files/png_parser.cpp"},
     r"vulkan/.*": {"render/gpu/vulkan.h"},
     r"sqlite3\.h": {"coordinator/sqlite.cpp"},
-    r"tiny_obj_loader\.h": {"render/obj_mesh.cpp"},
+    r"tiny_obj_loader\.h": {"render/files/obj_parser.cpp"},
     r"openssl/.*": {"core/digest.cpp", "security/x509.cpp"},
     r"Random123/.*": {"core/random.h"},
 }

@@ -10,7 +10,6 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/random.h"
 #include "storage/database_schema.h"
 #include "storage/fabric_database.h"
 #include "storage/user_block.h"
@@ -96,22 +95,7 @@ TEST_F(DamageTest, AnyDamagedByteOfTheUserBlockIsNoticed) {
   }
 }
 
-TEST_F(DamageTest, DamagedBytesAreNoticed) {
-  core::Random random(23, 0);
-  for (int i = 0; i < 400; ++i) {
-    std::string damaged = bytes_;
-    const std::uint32_t at = random.below(static_cast<std::uint32_t>(bytes_.size()));
-    damaged[at] = static_cast<char>(damaged[at] ^ static_cast<char>(1 + random.below(255)));
-    EXPECT_THAT(complaint_about(damaged), HasSubstr("damaged.h5")) << "byte " << at;
-  }
-}
-
-TEST_F(DamageTest, TruncationAndSurplusAreNoticed) {
-  core::Random random(29, 0);
-  for (int i = 0; i < 100; ++i) {
-    const std::uint32_t length = random.below(static_cast<std::uint32_t>(bytes_.size()));
-    EXPECT_NE(complaint_about(bytes_.substr(0, length)), "") << length << " bytes";
-  }
+TEST_F(DamageTest, SurplusIsNoticed) {
   EXPECT_NE(complaint_about(bytes_ + '\0'), "");
   EXPECT_EQ(complaint_about(bytes_), "");
 }
@@ -131,55 +115,8 @@ TEST_F(DamageTest, DatasetsHaveChecksumsOfTheirOwn) {
               testing::AllOf(HasSubstr("/exemplar/size_mm"), HasSubstr("checksum")));
 }
 
-// Most bytes of a file are spare or cannot be told from other values; those that lead the library
-// astray end in an error and not in a crash.
-TEST_F(DamageTest, DamagedBytesUnderARightDigestNeverCrash) {
-  core::Random random(31, 0);
-  int noticed = 0;
-  for (int i = 0; i < 300; ++i) {
-    std::string damaged = bytes_;
-    const std::uint32_t at =
-        kUserBlockBytes + random.below(static_cast<std::uint32_t>(bytes_.size() - kUserBlockBytes));
-    damaged[at] = static_cast<char>(damaged[at] ^ static_cast<char>(1 + random.below(255)));
-    noticed += complaint_about(sealed(damaged)).empty() ? 0 : 1;
-  }
-  EXPECT_GT(noticed, 50);
-}
-
-TEST_F(DamageTest, TamperedFilesWithRightDigestsAreRefusedNamingTheDataset) {
-  const std::pair<const char*, const char*> cases[] = {
-      {"missing", "/cells/coordinates is missing"},
-      {"soft_link", "/cells/coordinates is a link"},
-      {"external_link", "/cells/coordinates is a link"},
-      {"external_group", "is a link"},
-      {"external_storage", "/visibility/ssdf/basis is not stored in chunks inside the file"},
-      {"virtual", "/visibility/ssdf/basis is not stored in chunks inside the file"},
-      {"foreign_filter", "/visibility/ssdf/basis uses a filter"},
-      {"huge_shape", "/exemplar/points_mm claims the shape"},
-      {"bomb", "do not add up to the points"},
-      {"wrong_type", "/visibility/ssdf/basis has elements f64"},
-      {"wrong_rank", "/visibility/ssdf/basis has shape"},
-      {"scalar", "/cells/mean_free_path_mm has no usable shape"},
-      {"group_in_place", "/cells/coordinates cannot be opened"},
-      {"variable_text", "/provenance/description has elements of a kind"},
-      {"not_finite", "/visibility/ssdf/basis is wrong: a number is not finite"},
-      {"contradicting_counts", "/visibility/ssdf/coefficients has shape"},
-  };
-  const auto tamper = [this](const std::string& how) {
-    return run_h5py("tamper " + whole_.string() + " " + damaged_.string() + " " + how);
-  };
-  if (!tamper("nothing")) {
-    GTEST_SKIP() << "/usr/bin/python3 has no h5py";
-  }
-  EXPECT_EQ(complaint(), "");
-  for (const auto& [how, expected] : cases) {
-    tamper(how);
-    EXPECT_THAT(complaint(), HasSubstr(expected)) << how;
-  }
-}
-
 TEST_F(DamageTest, H5pyReadsEverythingWithoutDocumentation) {
-  const std::optional<std::string> output = run_h5py("read " + whole_.string());
+  const std::optional<std::string> output = run_h5py(whole_.string());
   if (!output) {
     GTEST_SKIP() << "/usr/bin/python3 has no h5py";
   }
