@@ -140,6 +140,14 @@ grpc::Status JobService::SetPriority(grpc::ServerContext* context,
   });
 }
 
+grpc::Status JobService::Explain(grpc::ServerContext* context, const v1::ExplainRequest* request,
+                                 v1::ExplainResponse* response) {
+  return answer(*context, "JobService.Explain", [&] {
+    *response = scheduler_.explain(*request);
+    return grpc::Status::OK;
+  });
+}
+
 grpc::Status JobService::ListAttempts(grpc::ServerContext* context,
                                       const v1::ListAttemptsRequest* request,
                                       v1::ListAttemptsResponse* response) {

@@ -31,6 +31,8 @@ class JobService final : public v1::JobService::Service {
                         v1::RetryJobResponse* response) override;
   grpc::Status SetPriority(grpc::ServerContext* context, const v1::SetPriorityRequest* request,
                            v1::SetPriorityResponse* response) override;
+  grpc::Status Explain(grpc::ServerContext* context, const v1::ExplainRequest* request,
+                       v1::ExplainResponse* response) override;
   grpc::Status ListAttempts(grpc::ServerContext* context, const v1::ListAttemptsRequest* request,
                             v1::ListAttemptsResponse* response) override;
 

@@ -77,6 +77,7 @@ class Scheduler {
   [[nodiscard]] v1::Job set_priority(const Order& order, std::int32_t priority);
   [[nodiscard]] v1::Job job(const std::string& id_or_beginning);
   [[nodiscard]] std::vector<v1::Job> jobs(bool unfinished_only, std::size_t limit);
+  [[nodiscard]] v1::ExplainResponse explain(const v1::ExplainRequest& request);
   [[nodiscard]] std::vector<v1::AttemptInfo> attempts(const v1::ListAttemptsRequest& request);
 
   [[nodiscard]] std::vector<v1::Worker> workers();
@@ -154,6 +155,7 @@ class Scheduler {
   [[nodiscard]] std::string full_id(const std::string& beginning) const;
   [[nodiscard]] std::optional<std::uint64_t> revision_of(const std::string& id) const;
   [[nodiscard]] std::string worker_name(const std::string& name_or_id) const;
+  [[nodiscard]] const WorkerState* find_worker(const std::string& name_or_id) const;
   [[nodiscard]] v1::Assignment message(const AssignAction& assign) const;
   [[nodiscard]] v1::SynchronizeResponse message(const Reply& reply) const;
   void check_running() const;

@@ -3,6 +3,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "coordinator/explain.h"
 #include "coordinator/scheduler.h"
 #include "core/error.h"
 
@@ -33,6 +34,31 @@ StageName stage_named(const std::string& name) {
                     "there is no stage '" + name +
                         "'; they are geometry, grid, visibility, basis, coefficients, transfer "
                         "and shadow");
+}
+
+[[noreturn]] void throw_no_worker(const std::string& name) {
+  throw core::Error(core::Code::kNotFound,
+                    "there is no worker '" + name + "'; ListWorkers (weft workers) names all");
+}
+
+// Of a job that the queue has forgotten.
+v1::ExplainResponse explain_ended(const v1::Job& job) {
+  v1::ExplainResponse response;
+  response.set_subject("job " + job.id());
+  std::string verdict = "was cancelled";
+  if (job.state() == v1::JOB_STATE_SUCCEEDED) {
+    verdict = "succeeded: " + job.version().fabric() + "@" + std::to_string(job.version().number());
+  } else if (job.state() == v1::JOB_STATE_FAILED) {
+    verdict = "failed: " + job.error();
+  }
+  response.set_verdict(verdict);
+  v1::Reason& reason = *response.add_reasons();
+  reason.set_code(reason::kEnded);
+  reason.set_text("it has ended");
+  if (job.state() != v1::JOB_STATE_SUCCEEDED) {
+    reason.set_mend("'weft retry " + job.id() + "' puts it back into the queue");
+  }
+  return response;
 }
 
 }  // namespace
@@ -157,30 +183,66 @@ std::vector<v1::Worker> Scheduler::workers() {
   return workers;
 }
 
-// The name of the worker that has this name, this id, or alone an id that begins so.
-std::string Scheduler::worker_name(const std::string& name_or_id) const {
-  std::vector<std::string> names;
+// The worker that has this name, this id, or alone an id that begins so; nothing when there is
+// none.
+const WorkerState* Scheduler::find_worker(const std::string& name_or_id) const {
+  std::vector<const WorkerState*> found;
   for (const auto& [id, worker] : queue_.workers()) {
     if (worker.name == name_or_id || id == name_or_id) {
-      return worker.name;
+      return &worker;
     }
     if (!name_or_id.empty() && id.starts_with(name_or_id)) {
-      names.push_back(worker.name);
+      found.push_back(&worker);
     }
   }
-  if (names.size() > 1) {
+  if (found.size() > 1) {
     throw core::Error(core::Code::kInvalidArgument, "'" + name_or_id + "' begins the ids of " +
-                                                        std::to_string(names.size()) +
+                                                        std::to_string(found.size()) +
                                                         " workers; write more of it");
   }
-  // A machine that is away may still be drained or blocked.
-  const bool is_remembered =
-      queue_.is_drained(name_or_id) || !queue_.blocked_stages(name_or_id).empty();
-  if (names.empty() && !is_remembered) {
-    throw core::Error(core::Code::kNotFound, "there is no worker '" + name_or_id +
-                                                 "'; ListWorkers (weft workers) names all");
+  return found.empty() ? nullptr : found.front();
+}
+
+std::string Scheduler::worker_name(const std::string& name_or_id) const {
+  const WorkerState* const worker = find_worker(name_or_id);
+  if (worker != nullptr) {
+    return worker->name;
   }
-  return names.empty() ? name_or_id : names.front();
+  // A machine that is away may still be drained or blocked.
+  if (!queue_.is_drained(name_or_id) && queue_.blocked_stages(name_or_id).empty()) {
+    throw_no_worker(name_or_id);
+  }
+  return name_or_id;
+}
+
+v1::ExplainResponse Scheduler::explain(const v1::ExplainRequest& request) {
+  const std::lock_guard lock(mutex_);
+  const Time now = clock_.now();
+  switch (request.subject_case()) {
+    case v1::ExplainRequest::kJobId: {
+      const std::string id = full_id(request.job_id());
+      const JobState* const job = queue_.job(id);
+      return job == nullptr ? explain_ended(ended_.at(id)) : explain_job(queue_, *job, now);
+    }
+    case v1::ExplainRequest::kTask: {
+      const std::string id = full_id(request.task().job_id());
+      (void)stage_named(request.task().stage());
+      const JobState* const job = queue_.job(id);
+      return job == nullptr
+                 ? explain_ended(ended_.at(id))
+                 : explain_task(queue_, *job, request.task().stage(), request.task().shard(), now);
+    }
+    case v1::ExplainRequest::kWorker: {
+      const WorkerState* const worker = find_worker(request.worker());
+      if (worker == nullptr) {
+        throw_no_worker(request.worker());
+      }
+      return explain_worker(queue_, *worker, now);
+    }
+    case v1::ExplainRequest::SUBJECT_NOT_SET:
+      break;
+  }
+  throw core::Error(core::Code::kInvalidArgument, "the request names no job, task or worker");
 }
 
 std::vector<v1::Worker> Scheduler::change_worker(const Order& order, const Change& change) {

@@ -215,6 +215,27 @@ TEST_F(Orders, DrainedWorker_GetsNothing_AcrossARestart) {
   EXPECT_TRUE(again.work());
 }
 
+TEST_F(Orders, Explain_NamesWhatHoldsTheSubject_AlsoAfterItsEnd) {
+  const v1::Job job = scheduler_->submit(request("r1"), anna());
+  v1::ExplainRequest of_job;
+  of_job.set_job_id(job.id().substr(0, 5));
+  ASSERT_GE(scheduler_->explain(of_job).reasons_size(), 1);
+  EXPECT_EQ(scheduler_->explain(of_job).reasons(0).code(), "no_worker");
+  (void)scheduler_->cancel(order(job, anna()));
+  EXPECT_EQ(scheduler_->explain(of_job).verdict(), "was cancelled");
+  EXPECT_EQ(scheduler_->explain(of_job).reasons(0).code(), "ended");
+  v1::ExplainRequest of_worker;
+  of_worker.set_worker("w-1");
+  EXPECT_EQ(code_of([&] { (void)scheduler_->explain(of_worker); }, "no worker 'w-1'"),
+            core::Code::kNotFound);
+  FakeWorker worker(channel_, "w-1");
+  worker.request().set_wait_ms(0);
+  worker.work();
+  EXPECT_NE(scheduler_->explain(of_worker).verdict(), "");
+  EXPECT_EQ(code_of([&] { (void)scheduler_->explain({}); }, "names no"),
+            core::Code::kInvalidArgument);
+}
+
 TEST_F(Orders, UnblockedWorker_IsNamed_AndUnknownOnesAreNot) {
   FakeWorker worker(channel_, "w-1");
   worker.request().set_wait_ms(0);
