@@ -51,7 +51,7 @@ std::string Queue::make_token(const StageState& stage, std::uint64_t first,
 }
 
 // Finds what an attempt runs that owns nothing (any more, or since the coordinator's restart) from
-// what its token says. kNotYet: its job is still being planned.
+// what its token says. kNotYet: its stage is still to be planned, or planned again.
 Queue::Recognised Queue::recognise(const std::string& job_id, std::uint64_t attempt,
                                    const std::string& token, Attempt* run) {
   const JobState* const job = find_job(job_id);
@@ -79,7 +79,7 @@ Queue::Recognised Queue::recognise(const std::string& job_id, std::uint64_t atte
     run->token = token;
     return Recognised::kYes;
   }
-  return job->planning || !job->fingerprint ? Recognised::kNotYet : Recognised::kNo;
+  return job->is_planned ? Recognised::kNo : Recognised::kNotYet;
 }
 
 void Queue::on(const ReportEvent& event, Time now, Actions& actions) {
@@ -283,7 +283,11 @@ void Queue::keep(const ReportEvent& report, const RunningClaim& claim, Time now,
   if (!is_owner) {
     Attempt run;
     const Recognised recognised = recognise(claim.job, claim.attempt, claim.token, &run);
-    if (recognised == Recognised::kNotYet) {
+    // An attempt of before a restart may be restored when its stage is planned.
+    const bool may_be_restored = claim.attempt >> 32 < next_attempt_ >> 32;
+    const JobState* const job = find_job(claim.job);
+    if (recognised == Recognised::kNotYet && !job->is_paused &&
+        (job->planning || may_be_restored)) {
       return;  // neither renewed nor stopped: its worker goes on while its lease lasts
     }
     const bool is_adopted =

@@ -315,6 +315,34 @@ TEST(QueueFaults, CompletionFromBeforeARestart_WaitsForThePlanAndIsTaken) {
   EXPECT_EQ(after.job("a").phase, JobPhase::kSucceeded);
 }
 
+TEST(QueueFaults, CompletionOfAStageThatIsNotPlannedAgainYet_IsKeptUntilItIs) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 1);
+  QueueWorker other(cluster, "other", 1);
+  other.sync();
+  cluster.submit("a", {1, 1});
+  worker.sync(1);
+  worker.finish();
+  worker.sync();
+  other.sync(1);  // the second stage
+  ASSERT_EQ(other.held.size(), 1U);
+  const core::Digest first_work = QueueCluster::work("a", 0, 0);
+  const core::Digest first_result = QueueCluster::result_of(first_work);
+  cluster.cache.erase(first_work);
+  cluster.apply(ResultLostEvent{first_result});
+  // The first stage has to be run again before the second one can be planned again.
+  CompletionClaim& claim = other.finish();
+  claim.results = {{0, QueueCluster::result_of(QueueCluster::work("a", 1, 0)), 1}};
+  other.sync();
+  EXPECT_TRUE(other.has_unacknowledged());
+  worker.sync(1);
+  worker.finish();
+  worker.sync();
+  other.sync();
+  EXPECT_FALSE(other.has_unacknowledged());
+  EXPECT_EQ(cluster.job("a").phase, JobPhase::kSucceeded);
+}
+
 TEST(QueueFaults, FailuresFromBeforeARestart_Count) {
   QueueCluster cluster;
   cluster.hold_plans = true;
