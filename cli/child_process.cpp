@@ -15,6 +15,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/sandbox.h"
 
 namespace weft::cli {
 
@@ -146,14 +147,6 @@ std::optional<std::string> ChildProcess::read_line(double seconds) {
   }
 }
 
-std::filesystem::path program_folder() {
-  std::error_code failure;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot tell where weft's programs are: " + failure.message());
-  }
-  return self.parent_path();
-}
+std::filesystem::path program_folder() { return core::folder_of_this_program(); }
 
 }  // namespace weft::cli

@@ -51,9 +51,19 @@ std::uint64_t section_bytes(const std::vector<storage::StoredDataset>& datasets,
   return bytes;
 }
 
+// The text came with the file: what is nested deeper than any description is left out, because
+// writing it out again would take as much of the stack.
 Json parsed_or_text(const std::string& text) {
-  Json json = Json::parse(text, nullptr, false);
+  constexpr int kDeepest = 64;
+  const auto is_shallow = [](int depth, Json::parse_event_t, Json&) { return depth <= kDeepest; };
+  Json json = Json::parse(text, is_shallow, false);
   return json.is_discarded() ? Json(text) : json;
+}
+
+std::string name_in(const Json& description) {
+  const bool has_name =
+      description.is_object() && description.contains("name") && description["name"].is_string();
+  return has_name ? description["name"].get<std::string>() : "";
 }
 
 Json sizes_of(const storage::FabricDatabase& db, const std::filesystem::path& path) {
@@ -87,7 +97,7 @@ Json summary_of(const std::filesystem::path& path) {
   const Json sizes = sizes_of(db, path);
   Json json;
   json["file"] = path.string();
-  json["name"] = description.is_object() ? description.value("name", "") : "";
+  json["name"] = name_in(description);
   json["schema"] = 1;
   json["content_digest"] = storage::content_digest(path).hex();
   json["bytes"] = std::filesystem::file_size(path);
@@ -132,7 +142,11 @@ std::string joined(const Json& names) {
   return text;
 }
 
-void print_line(const char* label, const std::string& value) {
+// Values come from the file: none of them may steer the terminal.
+void print_line(const char* label, std::string value) {
+  std::replace_if(
+      value.begin(), value.end(),
+      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
   std::printf("%-18s%s\n", label, value.c_str());
 }
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <utility>
@@ -38,8 +39,7 @@ bool is_integer(const json& value, double least, double most) {
     return false;
   }
   const double number = value.get<double>();
-  return number == static_cast<double>(static_cast<std::int64_t>(number)) && number >= least &&
-         number <= most;
+  return number >= least && number <= most && number == std::trunc(number);
 }
 
 std::string enum_names(const FieldDescriptor& field) {

@@ -30,7 +30,8 @@ shading::FibreMaterial material_of(const v1::Material& material) {
 
 std::string name_in(const std::string& description_json) {
   const auto json = nlohmann::json::parse(description_json, nullptr, false);
-  return json.is_object() ? json.value("name", std::string()) : std::string();
+  const bool has_name = json.is_object() && json.contains("name") && json["name"].is_string();
+  return has_name ? json["name"].get<std::string>() : std::string();
 }
 
 }  // namespace
