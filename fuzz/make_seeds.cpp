@@ -1,0 +1,248 @@
+// Writes the seeds of fuzz/corpus: fuzz_make_seeds SOURCE_DIR FOLDER. Inputs that once crashed
+// something are put beside them by hand and stay.
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+
+#include "coordinator/scheduler.h"
+#include "core/clock.h"
+#include "core/file.h"
+#include "core/flat.h"
+#include "core/sandbox.h"
+#include "fabric/description.h"
+#include "proto/weft/v1/cluster.pb.h"
+#include "proto/weft/v1/render.pb.h"
+#include "render/animation.h"
+#include "render/files/exr_parser.h"
+#include "render/files/obj_parser.h"
+#include "render/image.h"
+#include "render/png.h"
+#include "render/scene_description.h"
+#include "storage/database_parser.h"
+#include "tests/storage_test_database.h"
+
+namespace {
+
+namespace core = weft::core;
+namespace v1 = weft::v1;
+using google::protobuf::FieldDescriptor;
+
+std::filesystem::path source;
+std::filesystem::path corpus;
+
+void put(const std::string& target, const std::string& name, const std::string& bytes) {
+  std::filesystem::create_directories(corpus / target);
+  core::write_file_atomically(corpus / target / name, bytes);
+}
+
+std::string small_wif() {
+  return "[WIF]\nVersion=1.1\nSource Program=none\n[CONTENTS]\nCOLOR PALETTE=true\n"
+         "[COLOR PALETTE]\nEntries=2\nRange=0,255\n[COLOR TABLE]\n1=255,255,255\n2=10,20,200\n"
+         "[WEAVING]\nShafts=4\nTreadles=4\nRising Shed=true\n"
+         "[WARP]\nThreads=4\nUnits=centimeters\nSpacing=0.05\nThickness=0.04\nColor=1\n"
+         "[WEFT]\nThreads=4\nSpacing=0.05\nColor=2\n"
+         "[THREADING]\n1=1\n2=2\n3=3\n4=4\n[TIEUP]\n1=1,2\n2=2,3\n3=3,4\n4=4,1\n"
+         "[TREADLING]\n1=1\n2=2\n3=3\n4=4\n[WARP COLORS]\n1=1\n2=2\n[WEFT SPACING]\n1=0.06\n";
+}
+
+void put_texts() {
+  for (const char* name : {"tiny.textproto", "knit_jersey.textproto"}) {
+    const std::filesystem::path path = source / "examples" / name;
+    if (std::filesystem::exists(path)) {
+      put("description", name, std::string(1, '\0') + core::read_file(path));
+    }
+  }
+  put("description", "small.json",
+      std::string(1, '\1') +
+          R"({"name": "a", "weave": {"matrix": {"rows": ["10", "01"]}}, "yarns": [{"name": "y"}]})");
+  put("wif", "twill.wif", small_wif());
+  put("obj", "square.obj",
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n"
+      "f 1/1/1 2/2/1 3/3/1 4/4/1\ng other\nf -4/-4 -3/-3 -2/-2\n");
+}
+
+std::string answer_of(std::uint8_t kind, const std::function<void(core::FlatWriter&)>& write) {
+  const std::filesystem::path path = corpus / "answer.tmp";
+  FILE* file = std::fopen(path.c_str(), "wb");
+  core::FlatWriter writer(fileno(file));
+  write(writer);
+  writer.flush();
+  std::fclose(file);
+  const std::string bytes = core::read_file(path);
+  std::filesystem::remove(path);
+  return static_cast<char>(kind) + bytes;
+}
+
+void put_pictures() {
+  weft::render::Image image(5, 4);
+  image.at(2, 2) = {1, 2, 3};
+  image.attributes["weft.scene"] = "{}";
+  image.channels.push_back({"single.R", std::vector<float>(20, 0.5F)});
+  const std::filesystem::path path = corpus / "picture.tmp";
+  for (const auto pixels : {weft::render::ExrPixels::kHalf, weft::render::ExrPixels::kFloat}) {
+    weft::render::write_exr(path, image, pixels);
+    const bool is_half = pixels == weft::render::ExrPixels::kHalf;
+    put("exr", is_half ? "half.exr" : "float.exr", core::read_file(path));
+  }
+  weft::render::write_png(path, 5, 4, weft::render::tone_mapped(image));
+  put("png", "colours.png", core::read_file(path));
+  std::filesystem::remove(path);
+  const auto handed = [&](const weft::core::SandboxHandler& handler, std::uint8_t kind,
+                          const std::string& bytes, std::vector<std::string> arguments) {
+    return answer_of(kind, [&](core::FlatWriter& writer) {
+      handler.parse(std::as_bytes(std::span(bytes)), arguments, writer);
+    });
+  };
+  put("answer", "exr",
+      handed(weft::render::exr_handler(), 2, core::read_file(corpus / "exr" / "half.exr"),
+             {"a.exr", ""}));
+  put("answer", "obj",
+      handed(weft::render::obj_handler(), 3, core::read_file(corpus / "obj" / "square.obj"),
+             {"a.obj"}));
+}
+
+// The smallest database that has everything: order 0, few angles.
+void put_database() {
+  weft::storage::FabricDatabase db = weft::storage::small_database();
+  db.sh_order = 0;
+  db.c_s.assign(std::size_t{2} * 3 * 512, 0.25F);
+  db.transfer.resize(std::size_t{3} * 3);
+  db.transfer_se.resize(std::size_t{3} * 3);
+  const std::filesystem::path path = corpus / "database.tmp";
+  weft::storage::write_database(db, path);
+  const std::string bytes = core::read_file(path);
+  std::filesystem::remove(path);
+  put("database", "small.h5", bytes);
+  const weft::core::SandboxHandler handler = weft::storage::database_handler();
+  for (const char* what : {weft::storage::kArraysRequest, weft::storage::kShapesRequest}) {
+    const bool is_shapes = what == weft::storage::kShapesRequest;
+    put("answer", what, answer_of(is_shapes ? 1 : 0, [&](core::FlatWriter& writer) {
+          handler.parse(std::as_bytes(std::span(bytes)), {what}, writer);
+        }));
+  }
+}
+
+v1::FabricDescription tiny() {
+  return weft::fabric::load_description(source / "examples" / "tiny.textproto");
+}
+
+void put_journal() {
+  const std::filesystem::path folder = corpus / "journal.tmp";
+  std::filesystem::remove_all(folder);
+  {
+    weft::coordinator::SchedulerOptions options;
+    options.state_folder = folder;
+    options.commit = [](auto&&...) { return core::Digest(); };
+    weft::coordinator::Scheduler scheduler(std::move(options), core::system_clock());
+    put("journal", "fresh.db", "");
+    for (const char* id : {"one", "two"}) {
+      v1::SubmitRequest request;
+      request.set_request_id(id);
+      *request.mutable_description() = tiny();
+      static_cast<void>(scheduler.submit(request, {}));
+    }
+  }
+  put("journal", "two_jobs.db", core::read_file(folder / "journal.db"));
+  std::filesystem::remove_all(folder);
+}
+
+// Something in every field that a message has, once.
+void fill(google::protobuf::Message& message, int depth) {
+  const auto& fields = *message.GetReflection();
+  for (int f = 0; f < message.GetDescriptor()->field_count(); ++f) {
+    const FieldDescriptor* field = message.GetDescriptor()->field(f);
+    if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+      if (depth > 0 && !field->is_repeated()) {
+        fill(*fields.MutableMessage(&message, field), depth - 1);
+      } else if (depth > 0) {
+        fill(*fields.AddMessage(&message, field), depth - 1);
+      }
+    } else if (!field->is_repeated() && field->cpp_type() == FieldDescriptor::CPPTYPE_STRING) {
+      const bool is_bytes = field->type() == FieldDescriptor::TYPE_BYTES;
+      // Jobs are found by the beginning of their ids.
+      const char* const text = field->name() == "job_id" ? "j" : "one";
+      fields.SetString(&message, field, is_bytes ? std::string(32, 'd') : text);
+    } else if (!field->is_repeated() && field->cpp_type() == FieldDescriptor::CPPTYPE_UINT64) {
+      fields.SetUInt64(&message, field, 1);
+    } else if (!field->is_repeated() && field->cpp_type() == FieldDescriptor::CPPTYPE_UINT32) {
+      fields.SetUInt32(&message, field, 1);
+    }
+  }
+}
+
+// For each method an empty request and a full one, and a submission that is right.
+void put_requests() {
+  const auto* file = v1::SubmitRequest::descriptor()->file();
+  int number = 0;
+  for (int s = 0; s < file->service_count(); ++s) {
+    for (int m = 0; m < file->service(s)->method_count(); ++m, ++number) {
+      const auto* method = file->service(s)->method(m);
+      const std::unique_ptr<google::protobuf::Message> message(
+          google::protobuf::MessageFactory::generated_factory()
+              ->GetPrototype(method->input_type())
+              ->New());
+      const std::string first(1, static_cast<char>(number));
+      put("rpc", method->name() + "_empty", first);
+      fill(*message, 2);
+      put("rpc", method->name() + "_full", first + message->SerializeAsString());
+      if (method->name() == "Submit") {
+        v1::SubmitRequest request;
+        request.set_request_id("one");
+        *request.mutable_description() = tiny();
+        put("rpc", "Submit_right", first + request.SerializeAsString());
+      }
+    }
+  }
+}
+
+// An order of a picture with one attached file.
+void put_orders() {
+  v1::RenderOrder order;
+  order.set_request_id("one");
+  *order.mutable_scene() = weft::render::parse_scene(
+      core::read_file(source / "examples" / "scenes" / "handkerchief.textproto"), "s.textproto",
+      "");
+  weft::render::expand_picture_defaults(*order.mutable_scene());
+  const std::string mesh = core::read_file(corpus / "obj" / "square.obj");
+  for (const std::string& file : weft::render::files_of(order.scene())) {
+    v1::Attachment& attachment = *order.add_attachments();
+    attachment.set_name(file);
+    attachment.set_digest(core::digest_of(mesh).binary());
+    attachment.set_size_bytes(mesh.size());
+  }
+  const std::string message = order.SerializeAsString();
+  put("order", "handkerchief",
+      std::string(1, '\0') + static_cast<char>(message.size() % 256) +
+          static_cast<char>(message.size() / 256) + message + mesh);
+  for (const char* name : {"swatch", "damask"}) {
+    const std::string text =
+        core::read_file(source / "examples" / "scenes" / (std::string(name) + ".textproto"));
+    put("order", name, "\1" + text);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fputs("usage: fuzz_make_seeds SOURCE_DIR FOLDER\n", stderr);
+    return 2;
+  }
+  source = argv[1];
+  corpus = argv[2];
+  std::filesystem::create_directories(corpus);
+  put_texts();
+  put_pictures();
+  put_database();
+  put_journal();
+  put_requests();
+  put_orders();
+  return 0;
+}
