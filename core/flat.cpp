@@ -45,6 +45,9 @@ void FlatWriter::put(const void* data, std::size_t size) {
   if (buffer_.size() + size > kBufferBytes) {
     flush();
   }
+  if (size == 0) {
+    return;
+  }
   if (size > kBufferBytes) {
     write_all(descriptor_, static_cast<const char*>(data), size);
   } else {

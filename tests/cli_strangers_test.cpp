@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -76,11 +77,12 @@ TEST_F(Strangers, NothingIsReadWithoutTheProgramThatReads) {
   std::filesystem::create_directory(elsewhere);
   std::filesystem::copy(program("weft"), elsewhere / "weft");
   const std::string log = folder_ / "log";
-  ChildProcess child({(elsewhere / "weft").string(), "verify", database_}, log);
+  const std::vector<std::string> command{(elsewhere / "weft").string(), "verify", database_};
+  ChildProcess child(command, log, false);
   EXPECT_EQ(child.wait(60), 5);
   EXPECT_THAT(core::read_file(log), HasSubstr("weft-open"));
   std::filesystem::copy(program("weft-open"), elsewhere / "weft-open");
-  ChildProcess again({(elsewhere / "weft").string(), "verify", database_}, log);
+  ChildProcess again(command, log, false);
   EXPECT_EQ(again.wait(60), 0);
 }
 

@@ -112,8 +112,8 @@ Image read_from(MemoryInput& input, const std::string& name, std::string_view la
 }  // namespace
 
 std::uint64_t exr_pixel_limit(std::uint64_t file_bytes) {
-  constexpr std::uint64_t kAllowance = std::uint64_t{1} << 24;
-  constexpr std::uint64_t kPerByte = 64;
+  constexpr std::uint64_t kAllowance = std::uint64_t{1} << 20;
+  constexpr std::uint64_t kPerByte = 256;  // of one colour alone, OpenEXR packs 170
   return std::min(kImagePixelLimit, kAllowance + kPerByte * std::min(file_bytes, kExrLimitBytes));
 }
 

@@ -10,7 +10,7 @@
 namespace weft::render {
 
 inline constexpr const char* kExrRequest = "exr";
-// An OpenEXR file may be so long, and hold so many pixels: 16 million and 64 for each of its bytes,
+// An OpenEXR file may be so long, and hold so many pixels: a million and 256 for each of its bytes,
 // and never more than the limit.
 inline constexpr std::uint64_t kExrLimitBytes = std::uint64_t{2} << 30;
 inline constexpr std::uint64_t kImagePixelLimit = std::uint64_t{1} << 27;

@@ -72,7 +72,9 @@ std::vector<Item> items_from(std::span<const std::byte> bytes, std::size_t limit
     throw core::Error(core::Code::kDataLoss, "the mesh did not come back whole");
   }
   std::vector<Item> items(bytes.size() / sizeof(Item));
-  std::memcpy(items.data(), bytes.data(), bytes.size());
+  if (!items.empty()) {
+    std::memcpy(items.data(), bytes.data(), bytes.size());
+  }
   return items;
 }
 
