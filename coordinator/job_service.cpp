@@ -2,6 +2,7 @@
 
 #include <thread>
 
+#include "coordinator/log_service.h"
 #include "coordinator/rpc.h"
 #include "proto/limits.h"
 
@@ -156,6 +157,21 @@ grpc::Status JobService::ListAttempts(grpc::ServerContext* context,
       response->add_attempts()->Swap(&attempt);
     }
     return grpc::Status::OK;
+  });
+}
+
+grpc::Status JobService::ReadLogs(grpc::ServerContext* context, const v1::ReadLogsRequest* request,
+                                  grpc::ServerWriter<v1::ReadLogsResponse>* writer) {
+  return answer(*context, "JobService.ReadLogs", [&]() -> grpc::Status {
+    const Counted counted(log_readers_);
+    if (counted.value() > kLogReadersLimit) {
+      return {
+          grpc::StatusCode::RESOURCE_EXHAUSTED,
+          std::to_string(kLogReadersLimit) + " calls read logs already (log readers); try again"};
+    }
+    return read_logs(
+        scheduler_, *request, [&] { return context->IsCancelled(); },
+        [&](const v1::ReadLogsResponse& response) { return writer->Write(response); });
   });
 }
 

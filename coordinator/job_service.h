@@ -35,6 +35,8 @@ class JobService final : public v1::JobService::Service {
                        v1::ExplainResponse* response) override;
   grpc::Status ListAttempts(grpc::ServerContext* context, const v1::ListAttemptsRequest* request,
                             v1::ListAttemptsResponse* response) override;
+  grpc::Status ReadLogs(grpc::ServerContext* context, const v1::ReadLogsRequest* request,
+                        grpc::ServerWriter<v1::ReadLogsResponse>* writer) override;
 
  private:
   // Sends the job whenever its revision is another, until it has ended or the caller is gone.
@@ -43,6 +45,7 @@ class JobService final : public v1::JobService::Service {
 
   Scheduler& scheduler_;
   std::atomic<int> watchers_{0};
+  std::atomic<int> log_readers_{0};
 };
 
 }  // namespace weft::coordinator

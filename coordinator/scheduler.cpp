@@ -47,6 +47,7 @@ Scheduler::Scheduler(SchedulerOptions options, const core::Clock& clock)
                 options_.state_folder / "journal.db")),
       blobs_(options_.state_folder / "blobs"),
       catalogue_(journal_, options_.state_folder / "versions"),
+      logs_(options_.state_folder / "logs"),
       queue_(options_.queue, journal_.epoch()) {
   // What an earlier process was writing when it died is of no use.
   std::filesystem::remove_all(options_.state_folder / "committing");

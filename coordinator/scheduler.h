@@ -19,6 +19,7 @@
 
 #include "coordinator/catalogue.h"
 #include "coordinator/journal.h"
+#include "coordinator/log_store.h"
 #include "coordinator/messages.h"
 #include "coordinator/order_log.h"
 #include "coordinator/queue.h"
@@ -106,6 +107,11 @@ class Scheduler {
 
   [[nodiscard]] storage::BlobStore& blobs() { return blobs_; }
   [[nodiscard]] const Catalogue& catalogue() const { return catalogue_; }
+  [[nodiscard]] LogStore& logs() { return logs_; }
+  // Whether the job has that attempt, and while it owns its shards, that token. Throws
+  // core::Error(kNotFound) when there is no such job.
+  [[nodiscard]] bool was_given(const std::string& job_id, std::uint64_t attempt,
+                               const std::string& token);
 
   // Ends all waiting calls; those and further ones get core::Error(kUnavailable).
   void stop();
@@ -193,6 +199,7 @@ class Scheduler {
   Journal journal_;
   storage::BlobStore blobs_;
   Catalogue catalogue_;
+  LogStore logs_;
 
   std::mutex mutex_;  // of everything below
   Queue queue_;

@@ -168,8 +168,25 @@ std::vector<v1::AttemptInfo> Scheduler::attempts(const v1::ListAttemptsRequest& 
       info.set_shards_done(live->second.shards_done);
       info.set_last_line(live->second.last_line);
     }
+    info.set_log_bytes(logs_.size(id, attempt.begin.attempt));
   }
   return attempts;
+}
+
+bool Scheduler::was_given(const std::string& job_id, std::uint64_t attempt,
+                          const std::string& token) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (full_id(job_id) != job_id) {
+      return false;
+    }
+    const auto live = queue_.attempts().find(attempt);
+    if (live != queue_.attempts().end()) {
+      return live->second.job == job_id && live->second.token == token;
+    }
+  }
+  const auto is_it = [&](const AttemptRecord& record) { return record.attempt == attempt; };
+  return !journal_.attempts_of(job_id, 1, is_it).empty();
 }
 
 std::vector<v1::Worker> Scheduler::workers() {

@@ -1,5 +1,6 @@
 #include "coordinator/worker_service.h"
 
+#include "coordinator/log_service.h"
 #include "coordinator/rpc.h"
 
 namespace weft::coordinator {
@@ -79,6 +80,13 @@ grpc::ServerUnaryReactor* WorkerService::Synchronize(grpc::CallbackServerContext
   auto* const exchange = new Exchange(scheduler_, *request, *response);  // see OnDone
   exchange->start(*context, *request);
   return exchange;
+}
+
+grpc::Status WorkerService::AppendLog(grpc::ServerContext* context,
+                                      const v1::AppendLogRequest* request,
+                                      v1::AppendLogResponse* response) {
+  return answer(*context, "WorkerService.AppendLog",
+                [&] { return append_log(scheduler_, *request, *response); });
 }
 
 grpc::Status WorkersService::ListWorkers(grpc::ServerContext* context,

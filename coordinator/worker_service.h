@@ -14,6 +14,8 @@ class WorkerService final
   grpc::ServerUnaryReactor* Synchronize(grpc::CallbackServerContext* context,
                                         const v1::SynchronizeRequest* request,
                                         v1::SynchronizeResponse* response) override;
+  grpc::Status AppendLog(grpc::ServerContext* context, const v1::AppendLogRequest* request,
+                         v1::AppendLogResponse* response) override;
 
  private:
   Scheduler& scheduler_;

@@ -121,6 +121,7 @@ LogSender::Sent LogSender::send(Attempt& attempt) const {
       case grpc::StatusCode::UNAVAILABLE:
       case grpc::StatusCode::DEADLINE_EXCEEDED:
       case grpc::StatusCode::CANCELLED:
+      case grpc::StatusCode::RESOURCE_EXHAUSTED:
         return Sent::kNotNow;
       default:
         spdlog::debug("job={} attempt={} event=log_refused error=\"{}\"", name.job_id(),
