@@ -40,6 +40,8 @@ sigset_t block_signals() {
 
 int serve(const Options& options) {
   const sigset_t signals = block_signals();
+  // A limit of file sizes (ulimit -f) is a full disk to us, which is said before the process ends.
+  std::signal(SIGXFSZ, SIG_IGN);
   coordinator::SchedulerOptions scheduler_options;
   scheduler_options.state_folder = options.state;
   scheduler_options.queue.lease_ms = options.lease_seconds * 1000;
