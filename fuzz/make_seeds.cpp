@@ -202,6 +202,18 @@ void put_requests() {
   }
 }
 
+void put_spool() {
+  v1::Completion fragment;
+  fragment.set_job_id("job");
+  fragment.set_attempt(1);
+  fragment.set_lease_token("token");
+  v1::ShardResult& result = *fragment.add_results();
+  result.set_shard(3);
+  result.set_digest(std::string(32, 'd'));
+  result.set_size_bytes(4);
+  put("spool", "fragment", "\1" + fragment.SerializeAsString());
+}
+
 // An order of a picture with one attached file.
 void put_orders() {
   v1::RenderOrder order;
@@ -244,5 +256,6 @@ int main(int argc, char** argv) {
   put_journal();
   put_requests();
   put_orders();
+  put_spool();
   return 0;
 }
