@@ -346,9 +346,18 @@ v1::Job Scheduler::submit(const v1::SubmitRequest& request, const security::Call
   return job;
 }
 
+// What was told stays so: what is known of the job is durable before it is said.
+v1::Job Scheduler::told(const std::string& id, std::unique_lock<std::mutex>& lock) {
+  v1::Job job = message(id);
+  const Journal::Ticket ticket = journal_.append({});
+  lock.unlock();
+  journal_.wait(ticket);
+  return job;
+}
+
 v1::Job Scheduler::job(const std::string& id_or_beginning) {
-  const std::lock_guard lock(mutex_);
-  return message(full_id(id_or_beginning));
+  std::unique_lock lock(mutex_);
+  return told(full_id(id_or_beginning), lock);
 }
 
 std::vector<v1::Job> Scheduler::jobs(bool unfinished_only, std::size_t limit) {
@@ -378,7 +387,7 @@ v1::Job Scheduler::wait_for_change(const std::string& job_id, std::uint64_t seen
   jobs_changed_.wait_for(lock, timeout, [&] { return stopping_ || revision_of(id) != seen; });
   --watchers_;
   check_running();
-  return message(id);
+  return told(id, lock);
 }
 
 // Nothing of a job that has ended: its last message is told whatever the caller saw.

@@ -43,6 +43,9 @@ struct SchedulerOptions {
   CommitFunction commit;
   // Nothing is submitted any more when the journal has grown to so much.
   std::uint64_t journal_limit_bytes = std::uint64_t{16} << 30;
+  // When our own disk fails, planning and assembling are tried again after so long, then after
+  // twice as long each time, for a quarter of an hour.
+  std::chrono::milliseconds put_off{1000};
 };
 
 inline constexpr std::size_t kUnfinishedJobsLimit = 1000;
@@ -165,6 +168,7 @@ class Scheduler {
   [[nodiscard]] v1::Assignment message(const AssignAction& assign) const;
   [[nodiscard]] v1::SynchronizeResponse message(const Reply& reply) const;
   void check_running() const;
+  v1::Job told(const std::string& id, std::unique_lock<std::mutex>& lock);
 
   // orders (scheduler_orders.cpp); `change` is called with mutex_ held, unless the order is a
   // repeated one, to add its own to the records and apply its event

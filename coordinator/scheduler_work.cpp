@@ -30,9 +30,8 @@ bool is_short(const core::Error& error) {
   return error.code() == core::Code::kUnavailable || error.code() == core::Code::kResourceExhausted;
 }
 
-constexpr auto kLook = std::chrono::seconds(1);  // how often what was put off is looked at
+constexpr auto kLook = std::chrono::seconds(1);
 constexpr std::uint32_t kTriesLimit = 20;
-constexpr std::chrono::milliseconds kFirstPause{1'000};
 constexpr std::chrono::milliseconds kLongestPause{60'000};
 
 }  // namespace
@@ -54,7 +53,11 @@ void Scheduler::work_through(std::deque<Task>& tasks) {
     const auto ready = std::find_if(tasks.begin(), tasks.end(),
                                     [&](const Task& task) { return task.not_before <= now; });
     if (ready == tasks.end()) {
-      tasks_changed_.wait_for(lock, kLook);
+      Time::duration pause = kLook;
+      for (const Task& task : tasks) {
+        pause = std::min<Time::duration>(pause, task.not_before - now);
+      }
+      tasks_changed_.wait_for(lock, pause);
       continue;
     }
     Task task = std::move(*ready);
@@ -102,7 +105,7 @@ bool Scheduler::put_off(Task task, std::deque<Task>& tasks, const std::string& p
   }
   const std::string job = std::visit([](const auto& t) { return t.job; }, task.what);
   const auto pause = std::min<std::chrono::milliseconds>(
-      kFirstPause * (1U << std::min(task.tries - 1, 10U)), kLongestPause);
+      options_.put_off * (1U << std::min(task.tries - 1, 10U)), kLongestPause);
   spdlog::warn("job={} event=put_off tries={} retry_ms={} message=\"{}\"", job, task.tries,
                pause.count(), problem);
   const std::lock_guard lock(mutex_);

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/file_fault.h"
 
 namespace weft::core {
 
@@ -23,7 +24,7 @@ namespace {
 class Descriptor {
  public:
   Descriptor(const std::filesystem::path& path, int flags)
-      : value_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {
+      : value_(file_system::open(path, flags)) {
     if (value_ < 0) {
       throw_errno("open", path);
     }
@@ -74,7 +75,8 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view d
     const Descriptor file(beside, O_WRONLY | O_CREAT | O_TRUNC);
     std::size_t written = 0;
     while (written < data.size()) {
-      const ssize_t n = ::write(file.value(), data.data() + written, data.size() - written);
+      const ssize_t n =
+          file_system::write(file.value(), beside, data.data() + written, data.size() - written);
       if (n < 0 && errno == EINTR) {
         continue;
       }
@@ -93,15 +95,15 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view d
 void publish_file(const std::filesystem::path& from, const std::filesystem::path& to) {
   {
     const Descriptor file(from, O_RDONLY);
-    if (::fsync(file.value()) != 0) {
+    if (file_system::sync(file.value(), from) != 0) {
       throw_errno("sync", from);
     }
   }
-  if (::rename(from.c_str(), to.c_str()) != 0) {
+  if (file_system::rename(from, to) != 0) {
     throw_errno("rename to", to);
   }
   const Descriptor folder(folder_of(to), O_RDONLY | O_DIRECTORY);
-  if (::fsync(folder.value()) != 0) {
+  if (file_system::sync(folder.value(), folder_of(to)) != 0) {
     throw_errno("sync", folder_of(to));
   }
 }
