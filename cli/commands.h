@@ -37,5 +37,6 @@ void add_inspect(CLI::App& app);
 void add_verify(CLI::App& app);
 void add_render(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_certs(CLI::App& app);
 
 }  // namespace weft::cli

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "proto/status.h"
 #include "security/channel.h"
+#include "security/tls_probe.h"
 
 namespace weft::client {
 
@@ -23,6 +24,12 @@ bool Coordinator::is_worth_repeating(const grpc::Status& status) {
 }
 
 void Coordinator::check(const grpc::Status& status, const std::string& doing) const {
+  if (status.error_code() == grpc::StatusCode::UNAVAILABLE) {
+    if (const std::string problem = security::tls_problem(endpoint_); !problem.empty()) {
+      throw core::Error(core::Code::kPermissionDenied,
+                        fmt::format("cannot {}: {}", doing, problem));
+    }
+  }
   if (is_worth_repeating(status)) {
     throw core::Error(
         core::Code::kUnavailable,

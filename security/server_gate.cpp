@@ -258,7 +258,7 @@ class ServerGate::Processor final : public grpc::AuthMetadataProcessor {
 class ServerGate::Watch final : public grpc::experimental::Interceptor {
  public:
   Watch(std::shared_ptr<Guard> guard, grpc::ServerContextBase& context)
-      : guard_(std::move(guard)), call_(guard_->remember(context)) {}
+      : guard_(std::move(guard)), context_(context) {}
   ~Watch() override { forget(); }
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
@@ -266,9 +266,11 @@ class ServerGate::Watch final : public grpc::experimental::Interceptor {
   Watch& operator=(Watch&&) = delete;
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
-    // After the status the context may go at any time.
-    if (methods->QueryInterceptionHookPoint(
-            grpc::experimental::InterceptionHookPoints::PRE_SEND_STATUS)) {
+    using Point = grpc::experimental::InterceptionHookPoints;
+    // Before this the context has no call yet, after the status it may go at any time.
+    if (methods->QueryInterceptionHookPoint(Point::POST_RECV_INITIAL_METADATA)) {
+      call_ = guard_->remember(context_);
+    } else if (methods->QueryInterceptionHookPoint(Point::PRE_SEND_STATUS)) {
       forget();
     }
     methods->Proceed();
@@ -295,6 +297,7 @@ class ServerGate::Watch final : public grpc::experimental::Interceptor {
   }
 
   std::shared_ptr<Guard> guard_;
+  grpc::ServerContextBase& context_;
   std::optional<Guard::Calls::iterator> call_;
 };
 

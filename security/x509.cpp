@@ -4,6 +4,7 @@
 #include <climits>
 #include <memory>
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <openssl/bio.h>
 #include <openssl/bn.h>
@@ -151,17 +152,10 @@ std::string text_of(const ASN1_STRING* string) {
 
 std::string address_of(const ASN1_OCTET_STRING* bytes) {
   const std::string raw = text_of(bytes);
-  const bool is_ip4 = raw.size() == 4;
-  std::string text;
-  for (std::size_t i = 0; i < raw.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(raw[i]);
-    if (is_ip4) {
-      text += fmt::format("{}{}", i > 0 ? "." : "", byte);
-    } else {
-      text += fmt::format("{}{:02x}", i > 0 && i % 2 == 0 ? ":" : "", byte);
-    }
-  }
-  return text;
+  char text[INET6_ADDRSTRLEN] = "";
+  const int family = raw.size() == sizeof(in_addr) ? AF_INET : AF_INET6;
+  const bool is_address = raw.size() == sizeof(in_addr) || raw.size() == sizeof(in6_addr);
+  return is_address && inet_ntop(family, raw.data(), text, sizeof(text)) != nullptr ? text : "";
 }
 
 void read_names(const X509& certificate, Certificate& read) {

@@ -32,7 +32,7 @@ BEHIND = {
     r"vulkan/.*": {"render/gpu/vulkan.h"},
     r"sqlite3\.h": {"coordinator/sqlite.cpp"},
     r"tiny_obj_loader\.h": {"render/files/obj_parser.cpp"},
-    r"openssl/.*": {"core/digest.cpp", "security/x509.cpp"},
+    r"openssl/.*": {"core/digest.cpp", "security/x509.cpp", "security/tls_probe.cpp"},
     r"Random123/.*": {"core/random.h"},
 }
 

@@ -6,6 +6,7 @@
 #include "cli/commands.h"
 #include "cli/exit_code.h"
 #include "core/error.h"
+#include "security/grpc_log.h"
 
 int main(int argc, char** argv) {
   namespace cli = weft::cli;
@@ -41,11 +42,13 @@ int main(int argc, char** argv) {
   cli::add_verify(app);
   cli::add_render(app);
   cli::add_compare(app);
+  cli::add_certs(app);
   const auto is_named = [argv](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
     std::fprintf(stderr, "weft: there is no command '%s'; weft --help lists them\n", argv[1]);
     return cli::kExitWrongUse;
   }
+  weft::security::silence_grpc();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

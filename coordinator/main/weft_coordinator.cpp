@@ -14,6 +14,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "security/endpoint_options.h"
+#include "security/grpc_log.h"
 
 namespace {
 
@@ -100,6 +101,7 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("coordinator"));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
   spdlog::set_level(spdlog::level::from_str(options.log_level));
+  weft::security::log_what_grpc_says();
   try {
     return serve(options);
   } catch (const core::Error& error) {

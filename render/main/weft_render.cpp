@@ -15,6 +15,7 @@
 #include "proto/address.h"
 #include "render/node/render_node.h"
 #include "security/endpoint_options.h"
+#include "security/grpc_log.h"
 
 namespace {
 
@@ -140,6 +141,7 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("render"));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
   spdlog::set_level(spdlog::level::from_str(options.log_level));
+  security::log_what_grpc_says();
   try {
     return serve(options);
   } catch (const core::Error& error) {

@@ -17,6 +17,7 @@
 #include "render/animation.h"
 #include "render/node/drawing_message.h"
 #include "security/channel.h"
+#include "security/tls_probe.h"
 
 namespace weft::render {
 namespace {
@@ -165,6 +166,9 @@ std::string NodeClient::explained(const grpc::Status& status) const {
       status.error_code() == grpc::StatusCode::UNAVAILABLE) {
     return "the render node at " + endpoint_.address +
            " cannot draw now: " + status.error_message();
+  }
+  if (const std::string problem = security::tls_problem(endpoint_); !problem.empty()) {
+    return problem;
   }
   return "no render node answers at " + endpoint_.address + " (" + status.error_message() +
          "); start one with 'weft-render', or name another with --node";

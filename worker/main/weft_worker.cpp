@@ -18,6 +18,7 @@
 #include "proto/limits.h"
 #include "security/channel.h"
 #include "security/endpoint_options.h"
+#include "security/grpc_log.h"
 #include "worker/lease_loop.h"
 
 namespace {
@@ -123,6 +124,7 @@ void work(Flags flags) {
   log->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
   spdlog::set_default_logger(log);
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
+  weft::security::log_what_grpc_says();
   weft::core::Interrupt interrupt;  // before any thread is started
   // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
   std::signal(SIGXFSZ, SIG_IGN);
