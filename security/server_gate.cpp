@@ -13,6 +13,8 @@
 
 #include <fmt/format.h>
 #include <grpc/grpc_security_constants.h>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/security/auth_metadata_processor.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/security/tls_certificate_provider.h>
@@ -78,6 +80,17 @@ std::string call_of(std::string_view path) {
 // Health and reflection: any role may ask.
 bool is_for_everyone(std::string_view path) {
   return path.starts_with("/grpc.health.v1.Health/") || path.starts_with("/grpc.reflection.");
+}
+
+// gRPC takes both services into the servers of builders that are made afterwards.
+std::unique_ptr<grpc::ServerBuilder> new_builder() {
+  static const bool is_done = [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    return true;
+  }();
+  static_cast<void>(is_done);
+  return std::make_unique<grpc::ServerBuilder>();
 }
 
 std::string pem_of(const grpc::AuthContext& peer) {
@@ -301,32 +314,33 @@ class ServerGate::Watch final : public grpc::experimental::Interceptor {
   std::optional<Guard::Calls::iterator> call_;
 };
 
-ServerGate::ServerGate(grpc::ServerBuilder& builder, const Endpoint& listen)
-    : listen_(listen.address) {
-  builder.SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
-  builder.SetMaxSendMessageSize(v1::kMessageLimitBytes);
+ServerGate::ServerGate(const Endpoint& listen) : builder_(new_builder()), listen_(listen.address) {
+  builder_->SetMaxReceiveMessageSize(v1::kMessageLimitBytes);
+  builder_->SetMaxSendMessageSize(v1::kMessageLimitBytes);
   // Two servers must not share a port.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, v1::kKeepaliveMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, v1::kKeepaliveTimeoutMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
-                             v1::kFastestPingMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, v1::kStreamsPerConnectionLimit);
-  if (listen.tls_folder.empty()) {
-    if (!listen.insecure && !v1::is_local_address(listen_)) {
-      throw core::Error(
-          core::Code::kPermissionDenied,
-          listen_ +
-              " can be reached from other machines, and without TLS calls are neither "
-              "encrypted nor checked; name the folder that 'weft certs issue' wrote "
-              "with --tls-folder, listen on 127.0.0.1:PORT or unix:PATH, or say "
-              "--insecure in a network that you trust");
-    }
-    builder.AddListeningPort(listen_, grpc::InsecureServerCredentials(), &port_);
-    return;
+  builder_->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder_->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, v1::kKeepaliveMs);
+  builder_->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, v1::kKeepaliveTimeoutMs);
+  builder_->AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder_->AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                               v1::kFastestPingMs);
+  builder_->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, v1::kStreamsPerConnectionLimit);
+  if (!listen.tls_folder.empty()) {
+    secure(listen.tls_folder);
+  } else if (listen.insecure || v1::is_local_address(listen_)) {
+    builder_->AddListeningPort(listen_, grpc::InsecureServerCredentials(), &port_);
+  } else {
+    throw core::Error(core::Code::kPermissionDenied,
+                      listen_ +
+                          " can be reached from other machines, and without TLS calls are neither "
+                          "encrypted nor checked; name the folder that 'weft certs issue' wrote "
+                          "with --tls-folder, listen on 127.0.0.1:PORT or unix:PATH, or say "
+                          "--insecure in a network that you trust");
   }
-  const TlsFolder folder{listen.tls_folder};
+}
+
+void ServerGate::secure(const std::string& path) {
+  const TlsFolder folder{path};
   const Certificate certificate =
       check_tls_folder(folder, TlsUse::kListen, core::system_clock().now());
   guard_ = std::make_shared<Guard>(folder);
@@ -338,24 +352,29 @@ ServerGate::ServerGate(grpc::ServerBuilder& builder, const Endpoint& listen)
   options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
   const auto credentials = grpc::experimental::TlsServerCredentials(options);
   credentials->SetAuthMetadataProcessor(std::make_shared<Processor>(guard_));
-  builder.AddListeningPort(listen_, credentials, &port_);
+  builder_->AddListeningPort(listen_, credentials, &port_);
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> factories;
   factories.push_back(std::make_unique<Watch::Factory>(guard_));
-  builder.experimental().SetInterceptorCreators(std::move(factories));
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, kConnectionAgeMs);
+  builder_->experimental().SetInterceptorCreators(std::move(factories));
+  builder_->AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, kConnectionAgeMs);
   spdlog::info("event=tls name={} hosts={} until={}", certificate.name,
                fmt::join(certificate.hosts, ","), date_text(certificate.valid_until));
 }
 
-ServerGate::~ServerGate() = default;
-
-std::string ServerGate::address() const {
-  if (port_ == 0) {
+std::unique_ptr<grpc::Server> ServerGate::start() {
+  std::unique_ptr<grpc::Server> server = builder_->BuildAndStart();
+  if (server == nullptr || port_ == 0) {
     throw core::Error(core::Code::kUnavailable,
                       "cannot listen on " + listen_ +
                           "; is it written HOST:PORT or unix:PATH, and is another program using "
                           "it?");
   }
+  return server;
+}
+
+ServerGate::~ServerGate() = default;
+
+std::string ServerGate::address() const {
   return listen_.starts_with("unix:")
              ? listen_
              : listen_.substr(0, listen_.rfind(':') + 1) + std::to_string(port_);

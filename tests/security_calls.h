@@ -112,11 +112,23 @@ class AnyCall : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffe
     return answers_ > 0;
   }
 
+  // The bytes of the message that came last.
+  [[nodiscard]] std::string answer() {
+    const std::lock_guard lock(mutex_);
+    return answer_;
+  }
+
   void OnReadDone(bool has_read) override {
     if (has_read) {
       {
         const std::lock_guard lock(mutex_);
         ++answers_;
+        std::vector<grpc::Slice> slices;
+        (void)response_.Dump(&slices);
+        answer_.clear();
+        for (const grpc::Slice& slice : slices) {
+          answer_.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+        }
       }
       changed_.notify_all();
       StartRead(&response_);
@@ -141,6 +153,7 @@ class AnyCall : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffe
   std::condition_variable changed_;
   bool is_done_ = false;
   int answers_ = 0;
+  std::string answer_;
   grpc::Status status_;
 };
 

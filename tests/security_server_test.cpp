@@ -42,10 +42,9 @@ class Watched final : public v1::JobService::Service {
 class SecuredServer {
  public:
   explicit SecuredServer(const Endpoint& listen) {
-    grpc::ServerBuilder builder;
-    gate_ = std::make_unique<ServerGate>(builder, listen);
-    builder.RegisterService(&jobs_);
-    server_ = builder.BuildAndStart();
+    gate_ = std::make_unique<ServerGate>(listen);
+    gate_->builder().RegisterService(&jobs_);
+    server_ = gate_->start();
     address_ = gate_->address();
   }
   ~SecuredServer() { server_->Shutdown(std::chrono::system_clock::now()); }

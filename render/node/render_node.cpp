@@ -2,7 +2,6 @@
 
 #include <thread>
 
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
@@ -17,20 +16,12 @@ constexpr std::chrono::milliseconds kBetweenQuestions{50};
 }  // namespace
 
 RenderNode::RenderNode(const RenderNodeOptions& options, const security::Endpoint& listen)
-    : service_(options) {
-  grpc::EnableDefaultHealthCheckService(true);
-  static const bool has_reflection = [] {
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-    return true;
-  }();
-  static_cast<void>(has_reflection);
-  grpc::ServerBuilder builder;
-  gate_ = std::make_unique<security::ServerGate>(builder, listen);
+    : service_(options), gate_(std::make_unique<security::ServerGate>(listen)) {
   grpc::ResourceQuota quota("render node");
   quota.SetMaxThreads(kThreadsLimit);
-  builder.SetResourceQuota(quota);
-  builder.RegisterService(&service_);
-  server_ = builder.BuildAndStart();
+  gate_->builder().SetResourceQuota(quota);
+  gate_->builder().RegisterService(&service_);
+  server_ = gate_->start();
   address_ = gate_->address();
   server_->GetHealthCheckService()->SetServingStatus("weft.v1.RenderService", true);
 }
