@@ -35,6 +35,7 @@ void BlobService::sweep_sometimes() {
 grpc::Status BlobService::Read(grpc::ServerContext* context, const v1::ReadRequest* request,
                                grpc::ServerWriter<v1::ReadResponse>* writer) {
   return answer(*context, "BlobService.Read", [&]() -> grpc::Status {
+    const OpenStreams::Ticket ticket = reads_.enter(*context);
     const core::Digest digest = digest_from(request->digest(), "digest");
     std::optional<storage::BlobReader> blob = storage::BlobReader::open(scheduler_.blobs(), digest);
     if (!blob) {
@@ -82,15 +83,16 @@ grpc::Status BlobService::Write(grpc::ServerContext* context,
                                 grpc::ServerReader<v1::WriteRequest>* reader,
                                 v1::WriteResponse* /*response*/) {
   return answer(*context, "BlobService.Write", [&]() -> grpc::Status {
+    const OpenStreams::Ticket ticket = writes_.enter(*context);
     v1::WriteRequest request;
     if (!reader->Read(&request)) {
       return {grpc::StatusCode::INVALID_ARGUMENT, "the stream has no message"};
     }
     const core::Digest digest = digest_from(request.digest(), "digest");
     if (request.size_bytes() > v1::kBlobLimitBytes) {
-      return {
-          grpc::StatusCode::RESOURCE_EXHAUSTED,
-          "the blob has " + std::to_string(request.size_bytes()) + " bytes; the limit is 1 GiB"};
+      return {grpc::StatusCode::RESOURCE_EXHAUSTED,
+              "blob_bytes_limit: the blob has " + std::to_string(request.size_bytes()) +
+                  " bytes; the limit is 1 GiB"};
     }
     // One of another size is damaged, and is replaced.
     if (scheduler_.blobs().use(digest) == request.size_bytes()) {

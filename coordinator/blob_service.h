@@ -3,7 +3,9 @@
 #include <atomic>
 #include <cstdint>
 
+#include "coordinator/open_streams.h"
 #include "coordinator/scheduler.h"
+#include "proto/limits.h"
 #include "proto/weft/v1/cluster.grpc.pb.h"
 #include "storage/blob_uploads.h"
 
@@ -29,6 +31,8 @@ class BlobService final : public v1::BlobService::Service {
   Scheduler& scheduler_;
   storage::BlobUploads uploads_;
   std::atomic<std::uint64_t> begun_{0};
+  OpenStreams reads_{"blob_reads", v1::kBlobReadsLimit, v1::kBlobReadsPerConnectionLimit};
+  OpenStreams writes_{"uploads", v1::kUploadsLimit, v1::kUploadsPerConnectionLimit};
 };
 
 }  // namespace weft::coordinator

@@ -12,22 +12,6 @@ namespace {
 
 constexpr auto kWatchInterval = std::chrono::milliseconds(250);
 
-// Counts itself in a number while it lives.
-class Counted {
- public:
-  explicit Counted(std::atomic<int>& count) : count_(count), value_(++count) {}
-  ~Counted() { --count_; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-  Counted(Counted&&) = delete;
-  Counted& operator=(Counted&&) = delete;
-  [[nodiscard]] int value() const { return value_; }
-
- private:
-  std::atomic<int>& count_;
-  int value_;
-};
-
 }  // namespace
 
 grpc::Status JobService::Submit(grpc::ServerContext* context, const v1::SubmitRequest* request,
@@ -61,11 +45,7 @@ grpc::Status JobService::ListJobs(grpc::ServerContext* context, const v1::ListJo
 grpc::Status JobService::WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
                                   grpc::ServerWriter<v1::WatchJobResponse>* writer) {
   return answer(*context, "JobService.WatchJob", [&]() -> grpc::Status {
-    const Counted counted(watchers_);
-    if (counted.value() > kWatchersLimit) {
-      return {grpc::StatusCode::RESOURCE_EXHAUSTED,
-              "64 calls watch jobs already; ask with GetJob now and then"};
-    }
+    const OpenStreams::Ticket ticket = watchers_.enter(*context);
     return send_changes(*context, request->job_id(), *writer);
   });
 }
@@ -163,12 +143,7 @@ grpc::Status JobService::ListAttempts(grpc::ServerContext* context,
 grpc::Status JobService::ReadLogs(grpc::ServerContext* context, const v1::ReadLogsRequest* request,
                                   grpc::ServerWriter<v1::ReadLogsResponse>* writer) {
   return answer(*context, "JobService.ReadLogs", [&]() -> grpc::Status {
-    const Counted counted(log_readers_);
-    if (counted.value() > kLogReadersLimit) {
-      return {
-          grpc::StatusCode::RESOURCE_EXHAUSTED,
-          std::to_string(kLogReadersLimit) + " calls read logs already (log readers); try again"};
-    }
+    const OpenStreams::Ticket ticket = log_readers_.enter(*context);
     return read_logs(
         scheduler_, *request, [&] { return context->IsCancelled(); },
         [&](const v1::ReadLogsResponse& response) { return writer->Write(response); });

@@ -1,13 +1,11 @@
 #pragma once
 
-#include <atomic>
-
+#include "coordinator/open_streams.h"
 #include "coordinator/scheduler.h"
+#include "proto/limits.h"
 #include "proto/weft/v1/cluster.grpc.pb.h"
 
 namespace weft::coordinator {
-
-inline constexpr int kWatchersLimit = 64;  // WatchJob calls at once; each holds a thread
 
 // What people do with jobs. Contracts: cluster.proto.
 class JobService final : public v1::JobService::Service {
@@ -44,8 +42,8 @@ class JobService final : public v1::JobService::Service {
                             grpc::ServerWriter<v1::WatchJobResponse>& writer);
 
   Scheduler& scheduler_;
-  std::atomic<int> watchers_{0};
-  std::atomic<int> log_readers_{0};
+  OpenStreams watchers_{"watchers", v1::kWatchersLimit, v1::kWatchersPerConnectionLimit};
+  OpenStreams log_readers_{"log_readers", v1::kLogReadersLimit, v1::kLogReadersPerConnectionLimit};
 };
 
 }  // namespace weft::coordinator

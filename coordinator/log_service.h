@@ -10,8 +10,6 @@
 // The calls about logs, as services make them. Contracts: cluster.proto.
 namespace weft::coordinator {
 
-inline constexpr int kLogReadersLimit = 32;  // ReadLogs calls at once; each holds a thread
-
 // WorkerService.AppendLog.
 [[nodiscard]] grpc::Status append_log(Scheduler& scheduler, const v1::AppendLogRequest& request,
                                       v1::AppendLogResponse& response);

@@ -309,6 +309,12 @@ void Scheduler::check_limits(const std::string& user) const {
 
 v1::Job Scheduler::submit(const v1::SubmitRequest& request, const security::Caller& caller) {
   check_id(request.request_id(), "request_id");
+  if (request.description().ByteSizeLong() > v1::kDescriptionLimitBytes) {
+    throw core::Error(core::Code::kResourceExhausted,
+                      "description_bytes_limit: the description has " +
+                          std::to_string(request.description().ByteSizeLong()) +
+                          " bytes, and may have " + std::to_string(v1::kDescriptionLimitBytes));
+  }
   fabric::check_description(request.description());
   JobRecord record;
   record.id = job_id_of(request.request_id());

@@ -12,6 +12,7 @@
 #include "coordinator/catalogue_service.h"
 #include "coordinator/job_service.h"
 #include "coordinator/worker_service.h"
+#include "proto/limits.h"
 #include "security/server_gate.h"
 
 namespace weft::coordinator {
@@ -64,6 +65,7 @@ Server::Server(Scheduler& scheduler, const security::Endpoint& listen)
   grpc::ServerBuilder& builder = services_->gate->builder();
   grpc::ResourceQuota quota("coordinator");
   quota.SetMaxThreads(kThreadsLimit);
+  quota.Resize(v1::kServerMemoryLimitBytes);
   builder.SetResourceQuota(quota);
   builder.RegisterService(&services_->worker);
   builder.RegisterService(&services_->workers);

@@ -33,6 +33,21 @@ inline constexpr int kKeepaliveTimeoutMs = 10'000;
 inline constexpr int kFastestPingMs = 10'000;
 inline constexpr int kStreamsPerConnectionLimit = 1024;
 
+// Calls that run for as long as their callers like, each with a thread and a chunk of memory.
+inline constexpr int kWatchersLimit = 64;
+inline constexpr int kWatchersPerConnectionLimit = 16;
+inline constexpr int kLogReadersLimit = 32;
+inline constexpr int kLogReadersPerConnectionLimit = 8;
+inline constexpr int kFetchesLimit = 64;  // FetchVersion and ReadPieces
+inline constexpr int kFetchesPerConnectionLimit = 16;
+inline constexpr int kBlobReadsLimit = 128;
+inline constexpr int kBlobReadsPerConnectionLimit = 64;
+inline constexpr int kUploadsLimit = 128;
+inline constexpr int kUploadsPerConnectionLimit = 64;
+inline constexpr std::uint64_t kServerMemoryLimitBytes = std::uint64_t{2} << 30;  // of messages
+
+inline constexpr std::size_t kDescriptionLimitBytes = std::size_t{4} << 20;
+
 // Of render.proto.
 inline constexpr int kAttachmentsLimit = 20'000;
 inline constexpr std::uint64_t kAttachmentBytesLimit = std::uint64_t{1} << 30;
