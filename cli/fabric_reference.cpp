@@ -1,6 +1,5 @@
 #include "cli/fabric_reference.h"
 
-#include <algorithm>
 #include <cstdlib>
 #include <system_error>
 #include <utility>
@@ -9,21 +8,14 @@
 #include "cli/client.h"
 #include "client/fabric_cache.h"
 #include "core/error.h"
+#include "proto/names.h"
 
 namespace weft::cli {
 
 namespace {
 
-constexpr std::size_t kNameLimit = 64;
 constexpr std::size_t kDigitsLimit = 18;
 constexpr std::uint64_t kCacheLimitBytes = std::uint64_t{16} << 30;
-
-bool is_name(std::string_view text) {
-  const auto is_plain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); };
-  return !text.empty() && text.size() <= kNameLimit && is_plain(text.front()) &&
-         std::all_of(text.begin(), text.end(),
-                     [&](char c) { return is_plain(c) || c == '_' || c == '-'; });
-}
 
 // $XDG_CACHE_HOME/weft, else ~/.cache/weft; empty when neither is set.
 std::filesystem::path cache_folder() {
@@ -44,7 +36,7 @@ std::filesystem::path cache_folder() {
 std::optional<FabricReference> parse_reference(std::string_view text) {
   const std::size_t at = text.find('@');
   const std::string_view name = text.substr(0, at);
-  if (!is_name(name)) {
+  if (!v1::is_fabric_name(name)) {
     return std::nullopt;
   }
   FabricReference reference{std::string(name), std::nullopt};

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "proto/names.h"
 #include "storage/fabric_database.h"
 
 namespace weft::client {
@@ -180,10 +181,15 @@ std::string reference_text(const v1::Version& version) {
 v1::Version find_version(Coordinator& coordinator, const std::string& reference) {
   v1::GetVersionRequest request;
   request.set_reference(reference);
-  return coordinator
-      .call(coordinator.catalogue(), &v1::CatalogueService::Stub::GetVersion, request,
-            "look up " + reference)
-      .version();
+  const v1::GetVersionResponse response =
+      coordinator.call(coordinator.catalogue(), &v1::CatalogueService::Stub::GetVersion, request,
+                       "look up " + reference);
+  // The name becomes a file's: what a coordinator says is not believed to be one.
+  if (!v1::is_fabric_name(response.version().fabric())) {
+    throw core::Error(core::Code::kDataLoss, "the coordinator's answer about " + reference +
+                                                 " names no fabric; is it a coordinator of weft?");
+  }
+  return response.version();
 }
 
 core::Digest version_digest(const v1::Version& version) {

@@ -1,10 +1,10 @@
 #include "coordinator/messages.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "core/error.h"
 #include "proto/limits.h"
+#include "proto/names.h"
 
 namespace weft::coordinator {
 
@@ -23,20 +23,6 @@ void check_count(std::uint64_t count, std::uint64_t limit, const char* field) {
            std::to_string(limit) + " are allowed");
   }
 }
-
-bool is_word_of(const std::string& text, const char* further) {
-  return !text.empty() && text.size() <= v1::kIdLimit &&
-         std::all_of(text.begin(), text.end(), [&](char c) {
-           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                  std::strchr(further, c) != nullptr;
-         });
-}
-
-bool is_user_name(const std::string& name) {
-  return is_word_of(name, "_.@-") && is_word_of(name.substr(0, 1), "");
-}
-
-bool is_label(const std::string& label) { return is_word_of(label, "_.=-"); }
 
 CompletionClaim completion_from(const v1::Completion& completion) {
   CompletionClaim claim;
@@ -79,12 +65,7 @@ core::Digest digest_from(const std::string& bytes, const char* field) {
 }
 
 void check_id(const std::string& id, const char* field) {
-  const bool is_good =
-      !id.empty() && id.size() <= v1::kIdLimit && std::all_of(id.begin(), id.end(), [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-               c == '_' || c == '-';
-      });
-  if (!is_good) {
+  if (!v1::is_id(id)) {
     refuse(std::string(field) + " must be 1 to 64 characters of A-Z, a-z, 0-9, _ and -");
   }
 }
@@ -99,7 +80,7 @@ JobDemands demands_from(const v1::SubmitOptions& options, const security::Caller
   demands.priority = options.priority();
   demands.audit = options.audit();
   demands.labels.assign(options.labels().begin(), options.labels().end());
-  if (!is_user_name(demands.user)) {
+  if (!v1::is_user_name(demands.user)) {
     refuse(
         "options.user must be 1 to 64 characters of A-Z, a-z, 0-9, _, ., @ and -, and begin "
         "with a letter or a digit");
@@ -113,7 +94,7 @@ JobDemands demands_from(const v1::SubmitOptions& options, const security::Caller
     refuse("options.audit is a share: from 0 to 1");
   }
   for (const std::string& label : demands.labels) {
-    if (!is_label(label)) {
+    if (!v1::is_label(label)) {
       refuse("a label must be 1 to 64 characters of A-Z, a-z, 0-9, _, ., = and -");
     }
   }
@@ -131,6 +112,9 @@ ReportEvent report_from(const v1::SynchronizeRequest& request) {
   check_count(static_cast<std::uint64_t>(request.completions_size()), v1::kCompletionLimit,
               "the number of completions");
   check_count(request.wait_ms(), v1::kWaitLimitMs, "wait_ms");
+  if (!request.name().empty() && !v1::is_worker_name(request.name())) {
+    refuse("name is not readable text: UTF-8 without control characters");
+  }
   if (request.threads() == 0) {
     refuse("threads is 0; a worker has at least one");
   }
@@ -142,6 +126,11 @@ ReportEvent report_from(const v1::SynchronizeRequest& request) {
   report.fingerprint = digest_from(request.fingerprint(), "fingerprint");
   report.free_attempts = request.leaving() ? 0 : request.free_attempts();
   report.leaving = request.leaving();
+  for (const std::string& label : request.labels()) {
+    if (!v1::is_label(label)) {
+      refuse("a label must be 1 to 64 characters of A-Z, a-z, 0-9, _, ., = and -");
+    }
+  }
   report.labels.assign(request.labels().begin(), request.labels().end());
   report.wall_left_ms = request.wall_left_ms();
   for (const std::string& scene : request.scenes()) {

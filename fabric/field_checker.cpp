@@ -5,6 +5,7 @@
 
 #include "fabric/description_check.h"
 #include "fabric/presets.h"
+#include "proto/names.h"
 
 namespace weft::fabric {
 namespace {
@@ -21,13 +22,7 @@ bool within(double value, const Bounds& bounds) {
 
 }  // namespace
 
-bool is_name(std::string_view text) {
-  constexpr std::size_t kLongest = 64;
-  const auto plain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); };
-  return !text.empty() && text.size() <= kLongest && plain(text.front()) &&
-         std::all_of(text.begin(), text.end(),
-                     [&](char c) { return plain(c) || c == '_' || c == '-'; });
-}
+bool is_name(std::string_view text) { return v1::is_fabric_name(text); }
 
 FieldChecker FieldChecker::at(const std::string& field) const {
   return {mistakes_, path_.empty() ? field : path_ + "." + field};

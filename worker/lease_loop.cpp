@@ -230,7 +230,10 @@ void LeaseLoop::synchronize() {
       is_done = true;
     } else if (!was_interrupted && status.error_code() != grpc::StatusCode::ABORTED) {
       if (!is_away) {
-        spdlog::warn("worker={} coordinator=away error=\"{}\"", id_, status.error_message());
+        const std::string problem =
+            options_.connection_problem ? options_.connection_problem() : std::string();
+        spdlog::warn("worker={} coordinator=away error=\"{}\"", id_,
+                     problem.empty() ? status.error_message() : problem);
         is_away = true;
       }
       // A coordinator that comes back must hear of us within a lease.

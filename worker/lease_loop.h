@@ -41,6 +41,9 @@ struct WorkerOptions {
   double idle_limit_seconds = 0;  // ends when it had nothing to do for so long; 0: never
   double hung_seconds = 30;       // a thread that does not stop for so long is given up
   StageBakers::Maker make_baker = worker::make_baker;
+  // Asked when the coordinator does not answer: why no connection comes about, empty when that is
+  // not known.
+  std::function<std::string()> connection_problem;
   // Ends the process at once, with this exit code: threads that do not return make an orderly end
   // impossible. Everything that can be saved is. When it returns, run() waits for them.
   std::function<void(int code)> end_process;

@@ -6,6 +6,7 @@
 #include "core/digest.h"
 #include "core/error.h"
 #include "proto/limits.h"
+#include "proto/names.h"
 #include "render/animation.h"
 #include "render/scene_check.h"
 
@@ -14,14 +15,6 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& what) {
   throw core::Error(core::Code::kInvalidArgument, what);
-}
-
-bool is_request_id(const std::string& text) {
-  return !text.empty() && text.size() <= v1::kIdLimit &&
-         std::all_of(text.begin(), text.end(), [](char c) {
-           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                  c == '_' || c == '-';
-         });
 }
 
 void check_scene_of(const v1::Scene& scene) {
@@ -42,7 +35,7 @@ void check_scene_of(const v1::Scene& scene) {
 }  // namespace
 
 void check_order(const v1::RenderOrder& order) {
-  if (!is_request_id(order.request_id())) {
+  if (!v1::is_id(order.request_id())) {
     refuse("request_id: not 1 to 64 characters of [A-Za-z0-9_-]");
   }
   if (order.attachments_size() > v1::kAttachmentsLimit) {

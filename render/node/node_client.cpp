@@ -25,6 +25,8 @@ namespace {
 using Stream = grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>;
 
 constexpr std::chrono::milliseconds kBetweenQuestions{50};
+// An animation of many frames may take days; a node that is gone is noticed by the keepalive.
+constexpr std::chrono::hours kLongestOrder{24 * 14};
 
 // Ends the call when it is time to stop, however long a read takes.
 class StopWatcher {
@@ -190,6 +192,7 @@ void NodeClient::draw_pictures(const v1::Scene& scene, bool progressive, const F
     attachment.set_digest(core::digest_of(contents.back()).binary());
   }
   grpc::ClientContext context;
+  client::Coordinator::set_deadline(context, kLongestOrder);
   const StopWatcher watcher(context, should_stop);
   const auto stream = stub_->Render(&context);
   // Sent beside the reception: a long order may be refused before all of it is sent.

@@ -16,9 +16,11 @@
 #include "core/interrupt.h"
 #include "proto/address.h"
 #include "proto/limits.h"
+#include "proto/names.h"
 #include "security/channel.h"
 #include "security/endpoint_options.h"
 #include "security/grpc_log.h"
+#include "security/tls_probe.h"
 #include "worker/lease_loop.h"
 
 namespace {
@@ -48,11 +50,9 @@ std::string default_scratch() {
 }
 
 std::string mistake_in_label(const std::string& label) {
-  const bool is_good = !label.empty() && label.size() <= weft::v1::kIdLimit &&
-                       label.find_first_not_of(
-                           "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwx"
-                           "yz0123456789_.=-") == std::string::npos;
-  return is_good ? std::string() : "a label is 1 to 64 characters of A-Z, a-z, 0-9, _, ., = and -";
+  return weft::v1::is_label(label)
+             ? std::string()
+             : "a label is 1 to 64 characters of A-Z, a-z, 0-9, _, ., = and -";
 }
 
 struct Flags {
@@ -75,9 +75,9 @@ void declare(CLI::App& app, Flags& flags) {
   weft::security::add_security_options(app, flags.coordinator);
   app.add_option("--name", flags.worker.name, "Name for people, at most 128 characters")
       ->check([](const std::string& name) {
-        return !name.empty() && name.size() <= weft::v1::kNameLimitBytes
+        return weft::v1::is_worker_name(name)
                    ? std::string()
-                   : "the name must have 1 to 128 characters";
+                   : "the name must have 1 to 128 characters, none of them a control character";
       })
       ->capture_default_str();
   app.add_option("--threads", flags.worker.threads, "Shards computed at the same time")
@@ -129,6 +129,9 @@ void work(Flags flags) {
   // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
   std::signal(SIGXFSZ, SIG_IGN);
   flags.worker.coordinator = flags.coordinator.address;
+  flags.worker.connection_problem = [endpoint = flags.coordinator] {
+    return weft::security::tls_problem(endpoint);
+  };
   flags.worker.end_process = [](int code) {
     spdlog::shutdown();
     std::_Exit(code);
