@@ -26,6 +26,8 @@ constexpr double kStartSeconds = 30;
 constexpr double kWorkerStopSeconds = 12;
 constexpr double kCoordinatorStopSeconds = 10;
 constexpr int kRestartLimit = 5;
+// Whatever WEFT_TLS_FOLDER says of other clusters: this one is on this machine alone.
+constexpr const char* kNoTls = "";
 constexpr std::chrono::milliseconds kPoll{100};
 constexpr const char* kReadyLine = "weft-coordinator ready at ";
 
@@ -104,7 +106,7 @@ void LocalCluster::print(bool wants_json) const {
     print_json({{"coordinator", address_},
                 {"pid", coordinator_->pid()},
                 {"workers", workers},
-                {"options_.threadsper_worker", options_.threads},
+                {"threads_per_worker", options_.threads},
                 {"state", options_.state.string()}});
   } else {
     fmt::print("coordinator  {}  pid {}\n", address_, coordinator_->pid());
@@ -121,7 +123,8 @@ void LocalCluster::print(bool wants_json) const {
 void LocalCluster::start_coordinator(core::Interrupt& interrupt) {
   coordinator_ = std::make_unique<ChildProcess>(
       std::vector<std::string>{(program_folder() / "weft-coordinator").string(), "--listen",
-                               options_.listen, "--state", options_.state.string()},
+                               options_.listen, "--state", options_.state.string(), "--tls-folder",
+                               kNoTls},
       log_of("coordinator"), true);
   const core::Stopwatch since_start;
   while (address_.empty()) {
@@ -169,7 +172,7 @@ void LocalCluster::start_worker(Worker& worker) const {
       std::vector<std::string>{(program_folder() / "weft-worker").string(), "--coordinator",
                                address_, "--name", worker.name, "--threads",
                                std::to_string(options_.threads), "--scratch",
-                               (options_.state / "scratch").string()},
+                               (options_.state / "scratch").string(), "--tls-folder", kNoTls},
       log_of(worker.name), false);
 }
 

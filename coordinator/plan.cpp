@@ -226,7 +226,14 @@ Stage transfer_stage(const v1::FabricDescription& description,
   if (shape.size() != 2 || shape[0] == 0 || shape[1] != 3) {
     throw core::Error(core::Code::kDataLoss, "the grid's cell_coordinates are not [cells, 3]");
   }
-  stage.shard_count = shape[0] * ceil_div(spec.paths_per_cell(), spec.paths_per_shard());
+  const std::uint64_t shards_of_cell = ceil_div(spec.paths_per_cell(), spec.paths_per_shard());
+  if (shards_of_cell > kStageShardsLimit / shape[0]) {
+    throw core::Error(core::Code::kInvalidArgument,
+                      "stage_shards_limit: " + std::to_string(shape[0]) + " cells of " +
+                          std::to_string(shards_of_cell) + " shards each are more than " +
+                          std::to_string(kStageShardsLimit) + "; lower precompute.paths_per_cell");
+  }
+  stage.shard_count = shape[0] * shards_of_cell;
   stage.memory_bytes = scene_memory(tile);
   return stage;
 }

@@ -15,6 +15,9 @@ namespace weft::coordinator {
 enum class StageName { kGeometry, kGrid, kVisibility, kBasis, kCoefficients, kTransfer, kShadow };
 [[nodiscard]] const char* to_string(StageName name);
 
+// A coordinator keeps some hundred bytes for each shard.
+inline constexpr std::uint64_t kStageShardsLimit = 4'000'000;
+
 // One stage of a job, ready to run: everything its shards read is known.
 struct Stage {
   StageName name = StageName::kGeometry;

@@ -188,5 +188,26 @@ TEST(Plan, MalformedGrid_IsDataLoss) {
   }
 }
 
+TEST(Plan, MoreShardsThanTheLimit_AreRefusedByItsName) {
+  v1::FabricDescription description = small_description();
+  const FakeRun run(description);
+  description.mutable_precompute()->set_paths_per_cell(4'000'000'000);
+  constexpr std::uint32_t kCells = 100;
+  v1::Arrays arrays;
+  v1::add_array<std::uint32_t>(arrays, "cell_coordinates", {kCells, 3},
+                               std::vector<std::uint32_t>(3 * kCells));
+  const std::string grid = v1::serialize(arrays);
+  const std::vector<StageResults> finished = {run.finished()[0],
+                                              {StageName::kGrid, {core::digest_of(grid)}}};
+  try {
+    (void)plan(description, finished, [&](const core::Digest& digest) {
+      return digest == core::digest_of(grid) ? grid : run.read(digest);
+    });
+    FAIL() << "nothing was thrown";
+  } catch (const core::Error& error) {
+    EXPECT_EQ(std::string(error.what()).rfind("stage_shards_limit:", 0), 0U) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace weft::coordinator
