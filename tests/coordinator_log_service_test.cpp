@@ -171,7 +171,7 @@ TEST_F(LogServiceTest, ReadersAreLimited) {
   request.set_follow(true);
   std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
   std::vector<std::unique_ptr<grpc::ClientReader<v1::ReadLogsResponse>>> readers;
-  for (int i = 0; i < kLogReadersLimit; ++i) {
+  for (int i = 0; i < v1::kLogReadersPerConnectionLimit; ++i) {
     contexts.push_back(std::make_unique<grpc::ClientContext>());
     readers.push_back(jobs_->ReadLogs(contexts.back().get(), request));
     v1::ReadLogsResponse response;
@@ -180,7 +180,7 @@ TEST_F(LogServiceTest, ReadersAreLimited) {
   std::string text;
   const grpc::Status status = read(request, &text);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
-  EXPECT_NE(status.error_message().find("log readers"), std::string::npos);
+  EXPECT_NE(status.error_message().find("log_readers_per_connection_limit:"), std::string::npos);
   for (std::size_t i = 0; i < readers.size(); ++i) {
     contexts[i]->TryCancel();
     (void)readers[i]->Finish();
