@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "coordinator/log_service.h"
+#include "proto/limits.h"
 #include "tests/coordinator_service_fixture.h"
 
 // Logs from workers to people, through the real services.
