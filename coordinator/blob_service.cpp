@@ -90,9 +90,9 @@ grpc::Status BlobService::Write(grpc::ServerContext* context,
     }
     const core::Digest digest = digest_from(request.digest(), "digest");
     if (request.size_bytes() > v1::kBlobLimitBytes) {
-      return {grpc::StatusCode::RESOURCE_EXHAUSTED,
-              "blob_bytes_limit: the blob has " + std::to_string(request.size_bytes()) +
-                  " bytes; the limit is 1 GiB"};
+      return {grpc::StatusCode::RESOURCE_EXHAUSTED, "blob_bytes_limit: the blob has " +
+                                                        std::to_string(request.size_bytes()) +
+                                                        " bytes; the limit is 1 GiB"};
     }
     // One of another size is damaged, and is replaced.
     if (scheduler_.blobs().use(digest) == request.size_bytes()) {

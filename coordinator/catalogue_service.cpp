@@ -47,6 +47,7 @@ grpc::Status CatalogueService::FetchVersion(grpc::ServerContext* context,
                                             const v1::FetchVersionRequest* request,
                                             grpc::ServerWriter<v1::FetchVersionResponse>* writer) {
   return answer(*context, "CatalogueService.FetchVersion", [&]() -> grpc::Status {
+    const OpenStreams::Ticket ticket = fetches_.enter(*context);
     const VersionRecord version = catalogue_.find(request->reference());
     const std::filesystem::path path = catalogue_.path_of(version);
     std::error_code failure;

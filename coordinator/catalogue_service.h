@@ -1,6 +1,8 @@
 #pragma once
 
 #include "coordinator/catalogue.h"
+#include "coordinator/open_streams.h"
+#include "proto/limits.h"
 #include "proto/weft/v1/cluster.grpc.pb.h"
 
 namespace weft::coordinator {
@@ -20,6 +22,7 @@ class CatalogueService final : public v1::CatalogueService::Service {
 
  private:
   const Catalogue& catalogue_;
+  OpenStreams fetches_{"fetches", v1::kFetchesLimit, v1::kFetchesPerConnectionLimit};
 };
 
 }  // namespace weft::coordinator
