@@ -174,7 +174,7 @@ class Queue {
   [[nodiscard]] AttemptRecord record_of(const Attempt& attempt) const;
   Attempt end_attempt(std::uint64_t id, Outcome outcome, const std::string& message, Time now,
                       Actions& actions);
-  std::uint64_t take_shards(const Attempt& attempt);
+  std::uint64_t take_shards(Attempt& attempt);
   void renew(Attempt& attempt, Time now);
   void stop_attempts(JobState& job, Outcome outcome, const std::string& why, Time now,
                      Actions& actions);

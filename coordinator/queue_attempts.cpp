@@ -74,7 +74,7 @@ Attempt Queue::end_attempt(std::uint64_t id, Outcome outcome, const std::string&
 }
 
 // Marks what the attempt is to do as being done, and says how many shards that are.
-std::uint64_t Queue::take_shards(const Attempt& attempt) {
+std::uint64_t Queue::take_shards(Attempt& attempt) {
   JobState& job = *find_job(attempt.job);
   StageState& stage = job.stages[attempt.stage];
   const auto order = static_cast<std::uint32_t>(order_of_job_.at(job.id));
@@ -93,6 +93,8 @@ std::uint64_t Queue::take_shards(const Attempt& attempt) {
     } else if (stage.shards[shard] == ShardState::kRunning) {
       ++stage.doubled[shard];
       ++taken;
+    } else if (stage.shards[shard] != ShardState::kDone) {
+      attempt.skipped.insert(shard);
     }
   }
   return taken;

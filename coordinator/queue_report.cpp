@@ -326,9 +326,10 @@ bool Queue::is_needed(const Attempt& attempt) const {
   const StageState& stage = job(attempt.job)->stages[attempt.stage];
   for (std::uint64_t i = 0; i < attempt.shards; ++i) {
     const std::uint64_t shard = attempt.first_shard + i;
-    const bool is_open = attempt.purpose == Purpose::kAudit
-                             ? stage.auditing.contains(shard) || stage.disputed.contains(shard)
-                             : stage.shards[shard] == ShardState::kRunning;
+    const bool is_open =
+        attempt.purpose == Purpose::kAudit
+            ? stage.auditing.contains(shard) || stage.disputed.contains(shard)
+            : stage.shards[shard] == ShardState::kRunning && !attempt.skipped.contains(shard);
     if (is_open) {
       return true;
     }

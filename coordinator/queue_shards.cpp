@@ -207,7 +207,7 @@ void Queue::release(const Attempt& attempt, std::size_t losses, Time now) {
   const auto index = static_cast<std::uint32_t>(attempt.stage);
   for (std::uint64_t i = 0; i < attempt.shards; ++i) {
     const std::uint64_t shard = attempt.first_shard + i;
-    if (stage.shards[shard] != ShardState::kRunning) {
+    if (stage.shards[shard] != ShardState::kRunning || attempt.skipped.contains(shard)) {
       continue;
     }
     const auto doubled = stage.doubled.find(shard);

@@ -158,8 +158,9 @@ struct Attempt {
   std::uint64_t progress = 0;
   Time progress_at{};  // when one of these two last changed
   std::string last_line;
-  std::size_t losses = 0;  // of runs that these shards were in
-  double charged_ms = 0;   // to its job, in milliseconds of one thread
+  std::set<std::uint64_t> skipped;  // shards within its run that were not free when it began
+  std::size_t losses = 0;           // of runs that these shards were in
+  double charged_ms = 0;            // to its job, in milliseconds of one thread
 };
 
 struct WorkerState {

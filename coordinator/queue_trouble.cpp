@@ -275,7 +275,7 @@ void Queue::forgive(const std::string& worker_name, StageName name, Time now, Ac
       for (const std::uint64_t shard : shards) {
         forgive_shard({shard, static_cast<std::uint32_t>(order), s}, worker_name, now);
       }
-      if (!shards.empty()) {
+      if (stage.failures > 0 || !shards.empty()) {
         actions.failures_dropped.push_back({job.id, name, worker_name});
         ++job.revision;
         refresh(job, now);

@@ -1,9 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "core/random.h"
 #include "tests/queue_cluster.h"
 
-// Failures, back-off, run sizes, restarts, and whole clusters in virtual time.
+// Failures, back-off, run sizes and restarts.
 
 namespace weft::coordinator {
 namespace {
@@ -360,107 +359,6 @@ TEST(QueueFaults, FailuresFromBeforeARestart_Count) {
   worker.sync();
   EXPECT_EQ(cluster.job("a").phase, JobPhase::kFailed);
 }
-
-// Whole clusters with faults of every kind, from one seed: every job ends with the results that an
-// undisturbed cluster gives, no result is recorded twice, and shards are never lost.
-class QueueSimulation : public testing::TestWithParam<std::uint64_t> {
- protected:
-  struct Member {
-    std::unique_ptr<QueueWorker> worker;
-    std::uint64_t silent_until = 0;  // turns
-  };
-
-  void turn(Member& member, std::uint64_t now) {
-    QueueWorker& worker = *member.worker;
-    if (now < member.silent_until) {
-      return;
-    }
-    if (!worker.held.empty() && random_.below(3) != 0) {
-      const std::uint32_t fate = random_.below(20);
-      if (fate == 0) {
-        worker.fail("it burns");
-      } else if (fate == 1) {
-        worker.fail("out of memory", true);
-      } else if (fate == 2) {
-        worker.finish(random_.below(5'000), random_.below(3));
-      } else {
-        worker.finish(random_.below(5'000));
-      }
-    }
-    const Reply reply = worker.send(random_.below(3));
-    if (random_.below(8) != 0) {  // else the answer is lost
-      worker.receive(reply);
-    }
-    if (random_.below(15) == 0) {
-      member.silent_until = now + random_.below(60);  // may outlast its leases
-    }
-    if (random_.below(40) == 0) {  // killed, and another one starts
-      member.worker =
-          std::make_unique<QueueWorker>(*cluster_, name_of(++started_), 1 + random_.below(4));
-    }
-  }
-
-  void check_invariants() const {
-    ASSERT_EQ(cluster_->open_attempts.size(), cluster_->queue.attempts().size());
-    for (const auto& [id, attempt] : cluster_->queue.attempts()) {
-      ASSERT_TRUE(cluster_->open_attempts.contains(id));
-      ASSERT_GE(attempt.lease_until, cluster_->now);
-    }
-    for (const JobState* job : cluster_->queue.jobs()) {
-      for (const StageState& stage : job->stages) {
-        std::uint64_t running = 0;
-        std::uint64_t done = 0;
-        for (std::size_t i = 0; i < stage.shards.size(); ++i) {
-          running += stage.shards[i] == ShardState::kRunning ? 1 : 0;
-          done += stage.shards[i] == ShardState::kDone ? 1 : 0;
-          if (stage.shards[i] == ShardState::kDone) {
-            ASSERT_EQ(stage.results[i], QueueCluster::result_of(stage.digests[i]));
-          }
-        }
-        ASSERT_EQ(running, stage.running);
-        ASSERT_EQ(done, stage.done);
-      }
-    }
-  }
-
-  core::Random random_{GetParam(), 7};
-  QueueSettings settings_ = [] {
-    QueueSettings settings;
-    settings.failure_limit = 1'000;  // so that chance alone does not fail a job
-    settings.same_error_limit = 1'000;
-    settings.lonely_loss_limit = 1'000;
-    return settings;
-  }();
-  std::unique_ptr<QueueCluster> cluster_ = std::make_unique<QueueCluster>(settings_);
-  int started_ = 0;
-};
-
-TEST_P(QueueSimulation, EveryJobEndsWithTheSameResultsUnderAnyFaults) {
-  std::vector<Member> members(4);
-  for (Member& member : members) {
-    member.worker =
-        std::make_unique<QueueWorker>(*cluster_, name_of(++started_), 1 + random_.below(4));
-  }
-  cluster_->submit("a", {1, 20, 3, 17}, "same");
-  cluster_->submit("b", {1, 20, 5}, "same");
-  cluster_->submit("c", {1, 9}, "other");
-  std::uint64_t turns = 0;
-  for (; cluster_->ended.size() < 3 && turns < 20'000; ++turns) {
-    cluster_->advance(random_.below(2'000));
-    turn(members[random_.below(4)], turns);
-    ASSERT_NO_FATAL_FAILURE(check_invariants()) << "seed " << GetParam() << " turn " << turns;
-  }
-  ASSERT_EQ(cluster_->ended.size(), 3U) << "seed " << GetParam();
-  for (const JobState* job : cluster_->queue.jobs()) {
-    EXPECT_EQ(job->phase, JobPhase::kSucceeded) << job->error;
-  }
-  for (const auto& [work, times] : cluster_->results_recorded) {
-    EXPECT_EQ(times, 1);
-  }
-  EXPECT_TRUE(cluster_->queue.attempts().empty());
-}
-
-INSTANTIATE_TEST_SUITE_P(Seeds, QueueSimulation, testing::Range<std::uint64_t>(1, 41));
 
 }  // namespace
 }  // namespace weft::coordinator

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,14 +19,44 @@ class QueueCluster {
  public:
   using Ms = std::chrono::milliseconds;
 
-  explicit QueueCluster(QueueSettings settings = {}, std::uint32_t epoch = 1)
-      : queue(settings, epoch) {}
+  explicit QueueCluster(QueueSettings queue_settings = {}, std::uint32_t first_epoch = 1)
+      : queue(queue_settings, first_epoch), settings_(queue_settings), epoch_(first_epoch) {}
 
   // A job of stages with so many shards each; `content` tells equal work from different work.
   void submit(const std::string& job, std::vector<std::uint64_t> shards,
-              const std::string& content = "", std::optional<core::Digest> fingerprint = {}) {
+              const std::string& content = "", std::optional<core::Digest> fingerprint = {},
+              const JobDemands& demands = {}) {
     plans_[job] = {std::move(shards), content.empty() ? job : content};
-    apply(SubmitEvent{job, "fabric", fingerprint, now, {}, false});
+    submitted_.push_back({job, "fabric", fingerprint, now, demands, false});
+    apply(submitted_.back());
+  }
+  void submit_for(const std::string& user, const std::string& job,
+                  std::vector<std::uint64_t> shards, std::int32_t priority = 0) {
+    JobDemands demands;
+    demands.user = user;
+    demands.priority = priority;
+    submit(job, std::move(shards), "", {}, demands);
+  }
+  void submit_audited(const std::string& job, std::vector<std::uint64_t> shards, double audit) {
+    JobDemands demands;
+    demands.audit = audit;
+    submit(job, std::move(shards), "", {}, demands);
+  }
+
+  // The coordinator is killed and started again with what its journal has.
+  void restart() {
+    queue = Queue(settings_, ++epoch_);
+    prior_attempts = open_attempts;
+    for (const auto& [worker, is_liar] : blocked) {
+      apply(BlockEvent{worker.first, worker.second, true, is_liar});
+    }
+    const std::vector<SubmitEvent> jobs = submitted_;
+    for (const SubmitEvent& job : jobs) {
+      if (std::find(ended.begin(), ended.end(), job.job) == ended.end()) {
+        apply(job);
+      }
+    }
+    prior_attempts.clear();
   }
 
   // What a shard's work is called and what its result is.
@@ -37,20 +69,7 @@ class QueueCluster {
 
   Actions apply(const Event& event) {
     Actions actions = queue.apply(event, now);
-    for (const ResultRecord& record : actions.results) {
-      results_recorded[record.shard] += 1;
-      cache[record.shard] = record.result;
-    }
-    for (const AttemptRecord& record : actions.attempts_begun) {
-      open_attempts[record.attempt] = record;
-    }
-    for (const AttemptEndRecord& record : actions.attempts_ended) {
-      open_attempts.erase(record.attempt);
-      outcomes[record.attempt] = record.outcome;
-    }
-    for (const std::string& job : actions.ended) {
-      ended.push_back(job);
-    }
+    record(actions);
     if (!hold_plans) {
       for (const PlanAction& plan : actions.plan) {
         answer(plan);
@@ -79,7 +98,16 @@ class QueueCluster {
         stage.digests.push_back(work(content, done, i, plan.fingerprint));
         const auto known = cache.find(stage.digests.back());
         if (known != cache.end()) {
-          stage.known.push_back({i, known->second, {}, false});
+          const core::Digest& work_digest = stage.digests.back();
+          const auto author = authors.find(work_digest);
+          stage.known.push_back({i, known->second,
+                                 author == authors.end() ? std::string() : author->second,
+                                 audited.contains(work_digest)});
+        }
+      }
+      for (const FailureRecord& failure : failures) {
+        if (failure.job == plan.job && failure.stage == stage.name) {
+          stage.failures.push_back({failure.kind, failure.shard, failure.worker, failure.message});
         }
       }
       for (const auto& [id, attempt] : prior_attempts) {
@@ -109,27 +137,86 @@ class QueueCluster {
   Time now{std::chrono::hours(1)};
   bool hold_plans = false;
   std::vector<PlanAction> held_plans;
+  // As a journal has them.
   std::map<core::Digest, core::Digest> cache;
+  std::map<core::Digest, std::string> authors;
+  std::set<core::Digest> audited;
+  std::vector<FailureRecord> failures;
+  std::map<std::pair<std::string, StageName>, bool> blocked;
+  std::vector<MismatchRecord> mismatches;
   std::map<core::Digest, int> results_recorded;
   std::vector<std::string> ended;
-  // As a journal has them: what runs, how it ended, and what ran before a restart.
+  std::uint64_t attempts_begun = 0;
+  // What runs, how it ended, and what ran before a restart.
   std::map<std::uint64_t, AttemptRecord> open_attempts;
   std::map<std::uint64_t, Outcome> outcomes;
   std::map<std::uint64_t, AttemptRecord> prior_attempts;
 
  private:
+  void record(const Actions& actions) {
+    for (const ResultDropRecord& dropped : actions.results_dropped) {
+      const auto known = cache.find(dropped.shard);
+      if (known != cache.end() && known->second == dropped.result) {
+        cache.erase(known);
+        results_recorded.erase(dropped.shard);
+      }
+    }
+    for (const ResultRecord& record : actions.results) {
+      results_recorded[record.shard] += 1;
+      cache[record.shard] = record.result;
+      authors[record.shard] = record.worker;
+    }
+    for (const AuditRecord& audit : actions.audits) {
+      audited.insert(audit.shard);
+    }
+    failures.insert(failures.end(), actions.failures.begin(), actions.failures.end());
+    for (const FailuresDropRecord& dropped : actions.failures_dropped) {
+      std::erase_if(failures, [&](const FailureRecord& failure) {
+        return failure.job == dropped.job && failure.stage == dropped.stage &&
+               failure.worker == dropped.worker;
+      });
+    }
+    for (const BlockRecord& block : actions.blocks) {
+      blocked.erase({block.worker, block.stage});
+      if (block.is_blocked) {
+        blocked[{block.worker, block.stage}] = block.is_liar;
+      }
+    }
+    mismatches.insert(mismatches.end(), actions.mismatches.begin(), actions.mismatches.end());
+    for (const BindRecord& bound : actions.bound) {
+      for (SubmitEvent& job : submitted_) {
+        job.fingerprint = job.job == bound.job ? bound.fingerprint : job.fingerprint;
+      }
+    }
+    for (const AttemptRecord& begun : actions.attempts_begun) {
+      open_attempts[begun.attempt] = begun;
+      ++attempts_begun;
+    }
+    for (const AttemptEndRecord& end : actions.attempts_ended) {
+      open_attempts.erase(end.attempt);
+      outcomes[end.attempt] = end.outcome;
+    }
+    ended.insert(ended.end(), actions.ended.begin(), actions.ended.end());
+  }
+
+  QueueSettings settings_;
+  std::uint32_t epoch_;
+  std::vector<SubmitEvent> submitted_;
   std::map<std::string, std::pair<std::vector<std::uint64_t>, std::string>> plans_;
 };
 
 // A worker that does what cluster.proto asks of it; the test says when what ends.
 class QueueWorker {
  public:
-  QueueWorker(QueueCluster& cluster, std::string id, std::uint32_t threads = 2)
+  QueueWorker(QueueCluster& cluster, std::string id, std::uint32_t threads = 2,
+              const std::string& name = "")
       : cluster_(cluster) {
+    report_.name = name.empty() ? id : name;
     report_.worker = std::move(id);
-    report_.name = report_.worker;
     report_.threads = threads;
   }
+  // What it says of itself, for tests that change it.
+  ReportEvent& says() { return report_; }
 
   void set_fingerprint(const core::Digest& fingerprint) { report_.fingerprint = fingerprint; }
 
@@ -170,15 +257,19 @@ class QueueWorker {
   }
 
   // Ends its oldest attempt with the first `count` results (all: the default) after `work_ms`.
-  CompletionClaim& finish(std::uint64_t work_ms = 1000, std::uint64_t count = ~std::uint64_t{0}) {
+  // `lie`: with results that nobody else gives.
+  CompletionClaim& finish(std::uint64_t work_ms = 1000, std::uint64_t count = ~std::uint64_t{0},
+                          const std::string& lie = "") {
     const AssignAction assign = held.front();
     CompletionClaim claim{assign.job, assign.attempt, assign.token, {}, {}, work_ms};
     const JobState* const job = cluster_.queue.job(assign.job);
     for (std::uint64_t i = 0; job != nullptr && i < std::min(count, assign.shards); ++i) {
       for (const StageState& stage : job->stages) {
-        if (stage.name == assign.stage) {
+        if (stage.name == assign.stage && assign.first_shard + i < stage.shards.size()) {
           const std::uint64_t shard = assign.first_shard + i;
-          claim.results.push_back({shard, QueueCluster::result_of(stage.digests[shard]), 1});
+          const core::Digest right = QueueCluster::result_of(stage.digests[shard]);
+          claim.results.push_back(
+              {shard, lie.empty() ? right : core::digest_of(right.hex() + lie), 1});
         }
       }
     }
