@@ -35,7 +35,7 @@ PlannedEvent planned() {
 
 ReportEvent report_of(std::uint64_t worker) {
   ReportEvent report;
-  report.worker = "worker" + std::to_string(worker);
+  report.worker = std::to_string(worker).append("w");
   report.name = report.worker;
   report.threads = 16;
   report.free_attempts = 2;
@@ -59,9 +59,9 @@ void complete(const Queue& queue, ReportEvent& report, std::uint64_t* shards) {
   CompletionClaim completion{claim.job, claim.attempt, claim.token, {}, {}, 0};
   completion.work_ms = 20'000;
   for (std::uint64_t i = 0; i < attempt.shards; ++i) {
-    completion.results.push_back({attempt.first_shard + i,
-                                  core::digest_of("r" + std::to_string(attempt.first_shard + i)),
-                                  1});
+    completion.results.push_back(
+        {attempt.first_shard + i,
+         core::digest_of(std::to_string(attempt.first_shard + i).append("r")), 1});
   }
   *shards += attempt.shards;
   report.completions = {completion};

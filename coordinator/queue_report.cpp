@@ -368,7 +368,11 @@ bool Queue::adopt(const Attempt& run, const std::string& worker, Time now, Actio
   }
   lost_.erase(run.id);
   take_shards(attempt);
-  actions.attempts_begun.push_back(record_of(begin_attempt(std::move(attempt), now)));
+  const Attempt& begun = begin_attempt(std::move(attempt), now);
+  const auto its_end = [&](const AttemptEndRecord& record) { return record.attempt == begun.id; };
+  if (std::erase_if(actions.attempts_ended, its_end) == 0) {  // else it goes on as if never lost
+    actions.attempts_begun.push_back(record_of(begun));
+  }
   job.phase = JobPhase::kRunning;
   if (job.started_at == Time{}) {
     job.started_at = now;

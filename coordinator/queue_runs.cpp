@@ -114,7 +114,13 @@ std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
       pool->second.idle_threads - (worker.is_counted_idle ? worker.threads : 0);
   const std::uint64_t pending = stage.pending();
   if (is_busy && pending <= idle_threads) {
-    return 0;
+    const bool can_others = std::any_of(workers_.begin(), workers_.end(), [&](const auto& entry) {
+      return entry.second.is_counted_idle && entry.first != worker.id &&
+             hindrance(entry.second, job, stage, now).obstacle == Obstacle::kNone;
+    });
+    if (can_others) {
+      return 0;
+    }
   }
   const std::uint64_t per_thread =
       std::min<std::uint64_t>(worker.threads, ceil_div(pending, 1 + idle));

@@ -114,6 +114,17 @@ TEST_F(QueueSchedule, Labels_ChooseTheWorkers) {
   EXPECT_EQ(worker_.held.size(), 1U);
 }
 
+TEST_F(QueueSchedule, LastShards_AreNotLeftToIdleWorkersThatMayNotRunThem) {
+  JobDemands demands;
+  demands.labels = {"gpu"};
+  QueueWorker idle(cluster_, "idle", 8);
+  idle.sync();
+  worker_.says().labels = {"gpu"};
+  cluster_.submit("a", {2}, "", {}, demands);
+  worker_.sync(2);
+  EXPECT_EQ(worker_.held.size(), 2U);
+}
+
 TEST_F(QueueSchedule, DrainedWorker_FinishesAndGetsNothingNew) {
   cluster_.submit("a", {4});
   worker_.sync(1);

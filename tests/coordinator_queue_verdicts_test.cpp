@@ -264,6 +264,19 @@ TEST_F(QueueVerdicts, WorkerThatWasOnlyCutOff_GoesOnAndItsShardIsNotBlamed) {
   EXPECT_EQ(cluster_.open_attempts.size(), 1U);
 }
 
+TEST_F(QueueVerdicts, ReportInTheMomentTheLeaseEnds_KeepsTheAttempt) {
+  QueueWorker& worker = join("w");
+  cluster_.submit("a", {1});
+  worker.sync(1);
+  for (int i = 0; i < 6; ++i) {
+    cluster_.advance(5'000);
+  }
+  cluster_.now += std::chrono::milliseconds(1);
+  EXPECT_EQ(worker.sync().leases.size(), 1U);
+  EXPECT_EQ(cluster_.open_attempts.size(), 1U);
+  EXPECT_TRUE(cluster_.outcomes.empty());
+}
+
 TEST_F(QueueVerdicts, SupersededAttempts_AreCountedOnceAndSoAreTheirResults) {
   QueueWorker& slow = join("slow");
   QueueWorker& quick = join("quick");
