@@ -34,7 +34,7 @@ std::filesystem::path cache_folder() {
 }  // namespace
 
 std::optional<FabricReference> parse_reference(std::string_view text) {
-  const std::size_t at = text.find('@');
+  const std::size_t at = text.find_first_of("@:");
   const std::string_view name = text.substr(0, at);
   if (!v1::is_fabric_name(name)) {
     return std::nullopt;
@@ -43,6 +43,10 @@ std::optional<FabricReference> parse_reference(std::string_view text) {
   if (at == std::string_view::npos || text.substr(at) == "@latest") {
     return reference;
   }
+  if (text[at] == ':') {
+    reference.tag = text.substr(at + 1);
+    return v1::is_tag(reference.tag) ? std::optional(std::move(reference)) : std::nullopt;
+  }
   const std::string_view number = text.substr(at + 1);
   if (number.empty() || number.size() > kDigitsLimit || number.front() == '0' ||
       number.find_first_not_of("0123456789") != std::string_view::npos) {
@@ -50,6 +54,12 @@ std::optional<FabricReference> parse_reference(std::string_view text) {
   }
   reference.version = std::stoull(std::string(number));
   return reference;
+}
+
+std::string mistake_in_reference(const std::string& text) {
+  return parse_reference(text)
+             ? std::string()
+             : "'" + text + "' is not a version; write NAME, NAME@NUMBER, NAME@latest or NAME:TAG";
 }
 
 std::filesystem::path fabric_cache_folder() {
@@ -81,8 +91,8 @@ std::filesystem::path resolve_fabric(const std::string& reference,
     }
     throw core::Error(core::Code::kNotFound,
                       "there is no file " + reference +
-                          "; name a database (.h5), or a published fabric like silk, silk@3 or "
-                          "silk@latest ('weft fabrics' lists them)");
+                          "; name a database (.h5), or a published fabric like silk, silk@3, "
+                          "silk@latest or silk:approved ('weft fabrics' lists them)");
   }
   Client connection(coordinator);
   const v1::Version version = client::find_version(connection, reference);

@@ -10,16 +10,20 @@
 
 namespace weft::cli {
 
-// A published fabric: a name and a version number, or the latest.
+// A published fabric: a name, and a version number or a tag, or the latest.
 struct FabricReference {
   std::string name;                      // [a-z0-9][a-z0-9_-]{0,63}
-  std::optional<std::uint64_t> version;  // from 1; nothing: the latest
+  std::optional<std::uint64_t> version;  // from 1; nothing: the latest, or that of the tag
+  std::string tag = {};                  // [a-z0-9][a-z0-9_.-]{0,63}; empty: none
 
   bool operator==(const FabricReference&) const = default;
 };
 
-// Reads "silk", "silk@latest" or "silk@3"; nothing when `text` is none of them.
+// Reads "silk", "silk@latest", "silk@3" or "silk:approved"; nothing when `text` is none of them.
 [[nodiscard]] std::optional<FabricReference> parse_reference(std::string_view text);
+
+// What is wrong with `text` as a published version's name; empty when it is one.
+[[nodiscard]] std::string mistake_in_reference(const std::string& text);
 
 // The file that `reference` means: a path to a database, or a published version (parse_reference)
 // that is fetched from the coordinator at `coordinator` (host:port) into the local cache, unless it

@@ -14,7 +14,9 @@
 #include "cli/present.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
+#include "client/fabric_cache.h"
 #include "client/fetch_version.h"
+#include "core/error.h"
 
 namespace weft::cli {
 
@@ -22,8 +24,11 @@ namespace {
 
 constexpr const char* kHelp =
     "Bring a published version to a file.\n"
-    "A fetch that was broken off goes on where it was (OUTPUT.DIGEST.part); the file is checked\n"
-    "against its digest before it gets its name.\n"
+    "Only what is not here already comes over the wire: an older version at OUTPUT and the "
+    "versions\n"
+    "that were fetched for rendering are looked through for equal pieces. A fetch that was broken\n"
+    "off goes on where it was (OUTPUT.DIGEST.part); the file is checked against its digest before\n"
+    "it gets its name.\n"
     "With --import, a file from elsewhere takes the same way: it is copied, read whole by a\n"
     "program that can do nothing else, and gets its name when everything in it is right.\n"
     "Examples: weft fetch silk@latest -o silk.h5\n"
@@ -64,6 +69,26 @@ void run_import(const FetchOptions& options) {
              format_bytes(imported.size_bytes), imported.digest.hex());
 }
 
+// Pieces of versions that were fetched for rendering, where there is a folder for them.
+client::PieceIndex pieces_here() {
+  try {
+    return client::FabricCache(fabric_cache_folder(), 0).pieces();
+  } catch (const core::Error&) {
+    return {};
+  }
+}
+
+std::string words_of(const client::FetchOutcome& outcome, const v1::Version& version) {
+  if (outcome.was_there) {
+    return "it was there already";
+  }
+  if (outcome.bytes_fetched == version.size_bytes()) {
+    return fmt::format("fetched {}", format_bytes(version.size_bytes()));
+  }
+  return fmt::format("fetched {} of {}; the rest was here", format_bytes(outcome.bytes_fetched),
+                     format_bytes(version.size_bytes()));
+}
+
 void run(const FetchOptions& options) {
   if (!options.import.empty()) {
     run_import(options);
@@ -75,17 +100,18 @@ void run(const FetchOptions& options) {
       options.output.empty() ? reference_text(version) + ".h5" : options.output;
   check_output_file(output);
   const client::FetchOutcome outcome =
-      client::fetch_version(connection, version, output, terminal_report());
+      client::fetch_version(connection, version, output, terminal_report(), pieces_here());
   if (options.wants_json) {
     print_json({{"output", output},
                 {"was_there", outcome.was_there},
+                {"bytes_fetched", outcome.bytes_fetched},
+                {"bytes_reused", outcome.bytes_reused},
                 {"bytes_kept", outcome.bytes_kept},
                 {"version", to_json(version)}});
     return;
   }
-  fmt::print("{}: {}, {}, content {}{}\n", output, reference_text(version),
-             format_bytes(version.size_bytes()), short_digest(version.content_digest()),
-             outcome.was_there ? " (was there already)" : "");
+  fmt::print("{}: {}, content {}, {}\n", output, reference_text(version),
+             short_digest(version.content_digest()), words_of(outcome, version));
 }
 
 }  // namespace
@@ -93,18 +119,14 @@ void run(const FetchOptions& options) {
 void add_fetch(CLI::App& app) {
   auto options = std::make_shared<FetchOptions>();
   CLI::App* command = add_command(app, "fetch", kHelp);
-  CLI::Option* const reference =
-      command->add_option("reference", options->reference, "silk, silk@3 or silk@latest");
+  CLI::Option* const reference = command->add_option("reference", options->reference,
+                                                     "silk, silk@3, silk@latest or silk:approved");
   CLI::Option* const import =
       command->add_option("--import", options->import,
                           "Database file to take in, in place of a published version; without -o "
                           "it is kept among fetched fabrics");
   import->excludes(reference);
-  reference->check([](const std::string& text) {
-    return parse_reference(text)
-               ? std::string()
-               : "'" + text + "' is not a version; write NAME, NAME@NUMBER or NAME@latest";
-  });
+  reference->check(mistake_in_reference);
   command->add_option("-o,--output", options->output,
                       "Database to write; default: NAME@NUMBER.h5 in this folder");
   add_coordinator_option(*command, options->coordinator);

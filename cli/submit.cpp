@@ -60,6 +60,19 @@ v1::Job submit(Client& client, const v1::FabricDescription& description,
       .job();
 }
 
+// What earlier work saved.
+std::string saved_text(const v1::Job& job) {
+  std::uint64_t shards = 0;
+  std::uint64_t cached = 0;
+  for (const v1::StageProgress& stage : job.stages()) {
+    shards += stage.shards();
+    cached += stage.shards_cached();
+  }
+  return fmt::format("{} of {} results ({}) were there, and {} of the version's {}", cached, shards,
+                     format_bytes(job.cached_bytes()), format_bytes(job.version().shared_bytes()),
+                     format_bytes(job.version().size_bytes()));
+}
+
 void run(const SubmitFlags& options) {
   const v1::FabricDescription description =
       fabric::load_description(options.fabric, parse_quality(options.quality));
@@ -76,6 +89,9 @@ void run(const SubmitFlags& options) {
              job.id(), job.id());
   if (options.is_waiting) {
     job = follow_job(connection, job.id());
+  }
+  if (job.state() == v1::JOB_STATE_SUCCEEDED && job.cached_bytes() > 0) {
+    fmt::print(stderr, "{}\n", saved_text(job));
   }
   bool was_fetched = false;
   if (job.state() == v1::JOB_STATE_SUCCEEDED && !options.output.empty()) {

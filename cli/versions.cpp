@@ -16,7 +16,8 @@ namespace {
 
 constexpr const char* kHelp =
     "List the published versions of a fabric, newest first.\n"
-    "Equal CONTENT means equal files.\n"
+    "Equal CONTENT means equal files. SHARED is how much of the file was on the disk before, and\n"
+    "REUSED how many of the results it was made from had been computed before.\n"
     "Example: weft versions silk";
 
 struct VersionsOptions {
@@ -24,6 +25,14 @@ struct VersionsOptions {
   std::string fabric;
   bool wants_json = false;
 };
+
+std::string tags_text(const v1::Version& version, bool is_latest) {
+  std::string text = is_latest ? "latest" : "";
+  for (const std::string& tag : version.tags()) {
+    text += (text.empty() ? "" : ",") + tag;
+  }
+  return text;
+}
 
 void run(const VersionsOptions& options) {
   Client client(options.coordinator);
@@ -36,11 +45,17 @@ void run(const VersionsOptions& options) {
     print_json(to_json_array(response.versions()));
     return;
   }
-  Table table({"VERSION", "CONTENT", "SIZE", "PUBLISHED", "JOB", "COMMENT"});
+  const std::uint64_t latest = client::find_version(client, options.fabric).number();
+  Table table({"VERSION", "TAGS", "CONTENT", "SIZE", "SHARED", "REUSED", "PUBLISHED", "USER", "JOB",
+               "COMMENT"});
   for (const v1::Version& version : response.versions()) {
-    table.add({reference_text(version), short_digest(version.content_digest()),
-               format_bytes(version.size_bytes()), time_text(version.published_at_ms()),
-               version.job_id(), version.comment()});
+    const std::uint64_t shards = version.cached_shards() + version.computed_shards();
+    table.add({reference_text(version), tags_text(version, version.number() == latest),
+               short_digest(version.content_digest()), format_bytes(version.size_bytes()),
+               format_bytes(version.shared_bytes()),
+               fmt::format("{}/{}", version.cached_shards(), shards),
+               time_text(version.published_at_ms()), version.user(), version.job_id(),
+               version.comment()});
   }
   fmt::print("{}", table.text());
 }

@@ -10,9 +10,13 @@
 #include <sys/stat.h>
 
 #include "core/error.h"
+#include "core/file.h"
+#include "storage/pieces.h"
 
 namespace weft::client {
 namespace {
+
+constexpr const char* kPieces = ".pieces";
 
 struct Entry {
   std::filesystem::file_time_type used_at;
@@ -48,6 +52,22 @@ std::uint64_t total_of(const std::vector<Entry>& entries) {
 FabricCache::FabricCache(std::filesystem::path folder, std::uint64_t limit_bytes)
     : folder_(std::move(folder)), limit_bytes_(limit_bytes) {}
 
+PieceIndex FabricCache::pieces() const {
+  PieceIndex index;
+  for (const Entry& entry : entries_of(folder_)) {
+    if (entry.path.extension() != kPieces) {
+      continue;
+    }
+    try {
+      index.add_file(std::filesystem::path(entry.path).replace_extension(),
+                     storage::decode_pieces(core::read_file(entry.path)));
+    } catch (const core::Error&) {
+      continue;  // it went meanwhile, or is damaged: those pieces are fetched
+    }
+  }
+  return index;
+}
+
 std::uint64_t FabricCache::size_bytes() const { return total_of(entries_of(folder_)); }
 
 std::filesystem::path FabricCache::fetch(Coordinator& coordinator, const v1::Version& version,
@@ -66,7 +86,10 @@ std::filesystem::path FabricCache::fetch(Coordinator& coordinator, const v1::Ver
                                                     "; name one that can be written");
   }
   std::filesystem::path path = folder_ / (version_digest(version).hex() + ".h5");
-  fetch_version(coordinator, version, path, report);
+  const FetchOutcome outcome = fetch_version(coordinator, version, path, report, pieces());
+  if (!outcome.pieces.empty()) {
+    core::write_file_atomically(path.string() + kPieces, storage::encode_pieces(outcome.pieces));
+  }
   (void)::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);  // used now; no matter if it fails
   trim(path);
   return path;
@@ -82,9 +105,10 @@ void FabricCache::trim(const std::filesystem::path& kept) const {
     if (total_bytes <= limit_bytes_) {
       return;
     }
-    if (entry.path != kept) {
+    if (entry.path != kept && entry.path != kept.string() + kPieces) {
       std::error_code gone;
       std::filesystem::remove(entry.path, gone);
+      std::filesystem::remove(entry.path.string() + kPieces, gone);
       total_bytes -= entry.size_bytes;
     }
   }

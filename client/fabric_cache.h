@@ -7,8 +7,10 @@
 
 namespace weft::client {
 
-// Published versions on disk, each under its content digest; those used longest ago go when they
-// take more than the limit. Any number of processes may use one folder; any thread may call.
+// Published versions on disk, each under its content digest, with a list of its pieces beside it;
+// those used longest ago go when they take more than the limit. A version is put together from
+// pieces of the others as far as they have them. Any number of processes may use one folder; any
+// thread may call.
 class FabricCache {
  public:
   FabricCache(std::filesystem::path folder, std::uint64_t limit_bytes);
@@ -19,6 +21,9 @@ class FabricCache {
   // fetch_version throws.
   [[nodiscard]] std::filesystem::path fetch(Coordinator& coordinator, const v1::Version& version,
                                             const FetchReport& report) const;
+
+  // Where pieces of the versions that are here lie.
+  [[nodiscard]] PieceIndex pieces() const;
 
   [[nodiscard]] std::uint64_t size_bytes() const;
   [[nodiscard]] std::uint64_t limit_bytes() const { return limit_bytes_; }

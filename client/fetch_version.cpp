@@ -1,17 +1,12 @@
 #include "client/fetch_version.h"
 
-#include <cerrno>
 #include <chrono>
 #include <memory>
 #include <system_error>
 #include <thread>
 
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
+#include "client/fetch_pieces.h"
+#include "client/part_file.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "proto/names.h"
@@ -21,81 +16,6 @@ namespace weft::client {
 
 namespace {
 
-constexpr int kTriesWithoutProgress = 5;
-constexpr std::chrono::milliseconds kFirstWait{250};
-// A stream slower than this is taken for one that hangs.
-constexpr std::uint64_t kSlowestBytesPerSecond = 100'000;
-constexpr std::chrono::seconds kStreamAllowance{60};
-
-[[noreturn]] void throw_errno(const std::string& what, const std::filesystem::path& path) {
-  throw core::Error(core::Code::kUnavailable, "cannot " + what + " " + path.string() + ": " +
-                                                  std::generic_category().message(errno));
-}
-
-// The unfinished file, held by this process alone.
-class PartFile {
- public:
-  explicit PartFile(std::filesystem::path path) : path_(std::move(path)) {
-    while (true) {
-      file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-      if (file_ < 0) {
-        throw_errno("write", path_);
-      }
-      if (::flock(file_, LOCK_EX) != 0) {
-        ::close(file_);
-        throw_errno("lock", path_);
-      }
-      // Whoever held it before may have renamed it: then it is a finished file, not ours to touch.
-      struct stat held {};
-      struct stat named {};
-      if (::fstat(file_, &held) == 0 && ::stat(path_.c_str(), &named) == 0 &&
-          held.st_ino == named.st_ino) {
-        return;
-      }
-      ::close(file_);
-    }
-  }
-  ~PartFile() { ::close(file_); }
-  PartFile(const PartFile&) = delete;
-  PartFile& operator=(const PartFile&) = delete;
-  PartFile(PartFile&&) = delete;
-  PartFile& operator=(PartFile&&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
-  [[nodiscard]] std::uint64_t size_bytes() const {
-    struct stat held {};
-    if (::fstat(file_, &held) != 0) {
-      throw_errno("read", path_);
-    }
-    return static_cast<std::uint64_t>(held.st_size);
-  }
-
-  void clear() {
-    if (::ftruncate(file_, 0) != 0) {
-      throw_errno("shorten", path_);
-    }
-  }
-
-  void append(const std::string& data) {
-    if (::lseek(file_, 0, SEEK_END) < 0) {
-      throw_errno("write", path_);
-    }
-    std::size_t written = 0;
-    while (written < data.size()) {
-      const ssize_t n = ::write(file_, data.data() + written, data.size() - written);
-      if (n < 0 && errno != EINTR) {
-        throw_errno("write", path_);
-      }
-      written += n > 0 ? static_cast<std::size_t>(n) : 0;
-    }
-  }
-
- private:
-  std::filesystem::path path_;
-  int file_ = -1;
-};
-
 // One stream, from what is here to wherever it breaks off.
 grpc::Status stream_rest(Coordinator& coordinator, const v1::Version& version, PartFile& part,
                          const FetchReport& report) {
@@ -103,15 +23,14 @@ grpc::Status stream_rest(Coordinator& coordinator, const v1::Version& version, P
   request.set_reference(reference_text(version));
   request.set_offset(part.size_bytes());
   grpc::ClientContext context;
-  const std::uint64_t allowance = version.size_bytes() / kSlowestBytesPerSecond;
-  Coordinator::set_deadline(context, kStreamAllowance + std::chrono::seconds(allowance));
+  allow(context, version.size_bytes());
   const auto reader = coordinator.catalogue().FetchVersion(&context, request);
   v1::FetchVersionResponse response;
   while (reader->Read(&response)) {
     if (part.size_bytes() + response.data().size() > version.size_bytes()) {
       context.TryCancel();
       (void)reader->Finish();
-      part.clear();
+      part.shorten(0);
       throw core::Error(core::Code::kDataLoss,
                         reference_text(version) + ": more bytes came than the version has");
     }
@@ -129,31 +48,22 @@ grpc::Status stream_rest(Coordinator& coordinator, const v1::Version& version, P
   return reader->Finish();
 }
 
-void fetch_rest(Coordinator& coordinator, const v1::Version& version, PartFile& part,
-                const FetchReport& report) {
-  int tries_left = kTriesWithoutProgress;
-  std::chrono::milliseconds wait = kFirstWait;
+// From a coordinator that knows of no pieces.
+void fetch_stream(Coordinator& coordinator, const v1::Version& version, PartFile& part,
+                  const FetchReport& report, FetchOutcome& outcome) {
+  if (part.size_bytes() > version.size_bytes()) {
+    part.shorten(0);
+  }
+  outcome.bytes_kept = part.size_bytes();
+  Patience patience(coordinator, "fetch " + reference_text(version));
   while (part.size_bytes() < version.size_bytes()) {
     const std::uint64_t before = part.size_bytes();
     const grpc::Status status = stream_rest(coordinator, version, part, report);
-    if (part.size_bytes() == version.size_bytes()) {
-      return;
+    if (part.size_bytes() < version.size_bytes()) {
+      patience.wait(status, part.size_bytes() > before);
     }
-    const bool is_worth_repeating = status.ok() ||
-                                    status.error_code() == grpc::StatusCode::UNAVAILABLE ||
-                                    status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
-    if (part.size_bytes() > before) {
-      tries_left = kTriesWithoutProgress;
-      wait = kFirstWait;
-    }
-    if (!is_worth_repeating || --tries_left == 0) {
-      coordinator.check(status, "fetch " + reference_text(version));
-      throw core::Error(core::Code::kDataLoss,
-                        "the coordinator's file of " + reference_text(version) + " ends too early");
-    }
-    std::this_thread::sleep_for(wait);
-    wait *= 2;
   }
+  outcome.bytes_fetched = version.size_bytes() - outcome.bytes_kept;
 }
 
 bool is_this_version(const std::filesystem::path& path, const v1::Version& version) {
@@ -203,25 +113,32 @@ core::Digest version_digest(const v1::Version& version) {
 }
 
 FetchOutcome fetch_version(Coordinator& coordinator, const v1::Version& version,
-                           const std::filesystem::path& path, const FetchReport& report) {
+                           const std::filesystem::path& path, const FetchReport& report,
+                           PieceIndex here) {
   const core::Digest digest = version_digest(version);
+  FetchOutcome outcome;
   if (is_this_version(path, version)) {
-    return {true, 0};
+    outcome.was_there = true;
+    return outcome;
   }
   PartFile part(path.string() + "." + digest.hex().substr(0, 16) + ".part");
-  if (part.size_bytes() > version.size_bytes()) {
-    part.clear();
+  const std::optional<std::vector<storage::Piece>> pieces = manifest_of(coordinator, version);
+  if (pieces) {
+    here.add_database(path);
+    PieceFetch fetch(coordinator, version, *pieces, part, std::move(here));
+    fetch.run(report, outcome);
+    outcome.pieces = *pieces;
+  } else {
+    fetch_stream(coordinator, version, part, report, outcome);
   }
-  const std::uint64_t bytes_kept = part.size_bytes();
-  fetch_rest(coordinator, version, part, report);
   if (!is_this_version(part.path(), version)) {
-    part.clear();
+    part.shorten(0);
     throw core::Error(core::Code::kDataLoss,
                       "what came of " + reference_text(version) +
                           " is not what was published; it was thrown away, fetch it again");
   }
   core::publish_file(part.path(), path);
-  return {false, bytes_kept};
+  return outcome;
 }
 
 }  // namespace weft::client

@@ -23,6 +23,7 @@ void check_priority(std::int32_t priority);
 [[nodiscard]] ReportEvent report_from(const v1::SynchronizeRequest& request);
 
 [[nodiscard]] v1::Version message_of(const VersionRecord& version);
+[[nodiscard]] v1::HistoryEntry message_of(const HistoryRecord& step);
 // The job as people see it; comment, version and the like are the caller's.
 [[nodiscard]] v1::Job message_of(const Queue& queue, const JobState& job, Time now);
 [[nodiscard]] v1::AttemptInfo message_of(const KeptAttempt& attempt);

@@ -98,6 +98,23 @@ v1::Version message_of(const VersionRecord& version) {
   message.set_job_id(version.job);
   message.set_comment(version.comment);
   message.set_published_at_ms(version.published_at_ms);
+  message.mutable_tags()->Assign(version.tags.begin(), version.tags.end());
+  message.set_parent(version.parent);
+  message.set_shared_bytes(version.shared_bytes);
+  message.set_cached_shards(version.cached_shards);
+  message.set_computed_shards(version.computed_shards);
+  message.set_user(version.user);
+  return message;
+}
+
+v1::HistoryEntry message_of(const HistoryRecord& step) {
+  v1::HistoryEntry message;
+  message.set_at_ms(step.at_ms);
+  message.set_action(step.action);
+  message.set_number(step.number);
+  message.set_tag(step.tag);
+  message.set_user(step.user);
+  message.set_comment(step.comment);
   return message;
 }
 

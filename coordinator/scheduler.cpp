@@ -46,12 +46,13 @@ Scheduler::Scheduler(SchedulerOptions options, const core::Clock& clock)
       journal_((std::filesystem::create_directories(options_.state_folder),
                 options_.state_folder / "journal.db")),
       blobs_(options_.state_folder / "blobs"),
-      catalogue_(journal_, options_.state_folder / "versions"),
+      catalogue_(journal_, options_.state_folder),
       logs_(options_.state_folder / "logs"),
       queue_(options_.queue, journal_.epoch()) {
   // What an earlier process was writing when it died is of no use.
   std::filesystem::remove_all(options_.state_folder / "committing");
   std::filesystem::create_directories(options_.state_folder / "committing");
+  catalogue_.set_remake([this](const VersionRecord& version) { return remake(version); });
   load();
   planner_ = std::thread([this] { work_through(to_plan_); });
   committer_ = std::thread([this] { work_through(to_commit_); });
@@ -235,6 +236,7 @@ v1::Job Scheduler::message(const std::string& id) const {
   if (!file.problem.empty()) {
     message.set_waiting_for(file.problem);
   }
+  message.set_cached_bytes(file.cached_bytes);
   if (file.version) {
     *message.mutable_version() = message_of(*file.version);
   }

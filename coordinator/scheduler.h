@@ -109,12 +109,18 @@ class Scheduler {
   void result_lost(const core::Digest& result);
 
   [[nodiscard]] storage::BlobStore& blobs() { return blobs_; }
-  [[nodiscard]] const Catalogue& catalogue() const { return catalogue_; }
+  [[nodiscard]] Catalogue& catalogue() { return catalogue_; }
   [[nodiscard]] LogStore& logs() { return logs_; }
   // Whether the job has that attempt, and while it owns its shards, that token. Throws
   // core::Error(kNotFound) when there is no such job.
   [[nodiscard]] bool was_given(const std::string& job_id, std::uint64_t attempt,
                                const std::string& token);
+
+  // For the garbage collector. Results that unfinished jobs have or will be assembled from. Throws
+  // core::Error(kFailedPrecondition) while a job is not planned, and nobody knows its results.
+  [[nodiscard]] std::set<core::Digest> results_in_use();
+  // Forgets results whose blobs are gone.
+  void forget_gone(const std::vector<core::Digest>& results);
 
   // Ends all waiting calls; those and further ones get core::Error(kUnavailable).
   void stop();
@@ -132,6 +138,7 @@ class Scheduler {
     std::uint64_t first_revision = 0;  // of a job that was put back into the queue
     std::string problem;               // why its database could not be assembled yet
     std::optional<VersionRecord> version;
+    std::uint64_t cached_bytes = 0;  // of results that were not computed again
   };
   struct Task {
     std::variant<PlanAction, CommitAction> what;
@@ -184,8 +191,9 @@ class Scheduler {
   void run(const PlanAction& task);
   void run(const CommitAction& task);
   void report(const Event& event);
+  [[nodiscard]] std::optional<std::filesystem::path> remake(const VersionRecord& version);
   std::vector<PlannedStage> look_up(const std::string& job, const std::vector<Stage>& stages,
-                                    const core::Digest& fingerprint);
+                                    const core::Digest& fingerprint, std::uint64_t& cached_bytes);
   void add_recent(PlannedStage& stage) const;  // REQUIRES: mutex_ is held
   [[nodiscard]] std::string read_blob(const core::Digest& digest);
 

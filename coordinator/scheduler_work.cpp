@@ -144,7 +144,8 @@ void Scheduler::report(const Event& event) {
 // mutex_, which may take seconds for a million shards; add_recent then adds what fell in between.
 std::vector<PlannedStage> Scheduler::look_up(const std::string& job,
                                              const std::vector<Stage>& stages,
-                                             const core::Digest& fingerprint) {
+                                             const core::Digest& fingerprint,
+                                             std::uint64_t& cached_bytes) {
   std::vector<PlannedStage> planned;
   for (const Stage& stage : stages) {
     PlannedStage& of_stage = planned.emplace_back();
@@ -156,7 +157,10 @@ std::vector<PlannedStage> Scheduler::look_up(const std::string& job,
     }
     std::vector<std::optional<KeptResult>> results = journal_.results_of(of_stage.digests);
     for (std::size_t i = 0; i < results.size(); ++i) {
-      if (results[i] && blobs_.has(results[i]->result)) {
+      const std::optional<std::uint64_t> size_bytes =
+          results[i] ? blobs_.use(results[i]->result) : std::nullopt;
+      if (size_bytes) {
+        cached_bytes += *size_bytes;
         of_stage.known.push_back(
             {i, results[i]->result, std::move(results[i]->worker), results[i]->is_audited});
       }
@@ -212,7 +216,9 @@ void Scheduler::run(const PlanAction& task) {
   std::vector<Stage> stages =
       plan(description, finished, [this](const core::Digest& digest) { return read_blob(digest); });
   std::erase_if(stages, [&](const Stage& stage) { return known.contains(stage.name); });
-  PlannedEvent event{task.job, task.generation, look_up(task.job, stages, task.fingerprint)};
+  std::uint64_t cached_bytes = 0;
+  PlannedEvent event{task.job, task.generation,
+                     look_up(task.job, stages, task.fingerprint, cached_bytes)};
 
   lock.lock();
   const auto file = files_.find(task.job);
@@ -223,6 +229,7 @@ void Scheduler::run(const PlanAction& task) {
   if (file->second.generation != task.generation) {
     file->second.generation = task.generation;
     file->second.stages.clear();
+    file->second.cached_bytes = 0;
   }
   for (std::size_t i = 0; i < stages.size(); ++i) {
     PlannedStage& planned = event.stages[i];
@@ -232,6 +239,7 @@ void Scheduler::run(const PlanAction& task) {
                  planned.attempts.size());
     file->second.stages.emplace(planned.name, std::move(stages[i]));
   }
+  file->second.cached_bytes += cached_bytes;
   recent_ = {};
   apply(event, nullptr);
 }
@@ -253,6 +261,10 @@ void Scheduler::run(const CommitAction& task) {
   publication.content_digest = options_.commit(
       description, finished, [this](const core::Digest& digest) { return read_blob(digest); },
       publication.file);
+  for (const StageResults& stage : finished) {
+    publication.results.insert(publication.results.end(), stage.shards.begin(), stage.shards.end());
+  }
+  catalogue_.prepare(publication);
 
   lock.lock();
   job = queue_.job(task.job);
@@ -265,6 +277,11 @@ void Scheduler::run(const CommitAction& task) {
   JobFile& file = files_.at(task.job);
   file.problem.clear();
   publication.comment = file.comment;
+  publication.user = job->demands.user;
+  for (const StageState& stage : job->stages) {
+    publication.cached_shards += stage.cached;
+    publication.computed_shards += stage.done - stage.cached;
+  }
   publication.now_ms = to_ms(clock_.now());
   file.version = catalogue_.publish(publication);
   spdlog::info("job={} event=published version={}@{} digest={} bytes={}", task.job,

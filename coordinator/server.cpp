@@ -32,7 +32,7 @@ constexpr const char* kServices[] = {"weft.v1.WorkerService", "weft.v1.WorkersSe
 
 struct Server::Services {
   explicit Services(Scheduler& s)
-      : scheduler(s), worker(s), workers(s), blob(s), job(s), catalogue(s.catalogue()) {}
+      : scheduler(s), worker(s), workers(s), blob(s), job(s), catalogue(s) {}
 
   Scheduler& scheduler;
   WorkerService worker;

@@ -12,7 +12,7 @@ namespace {
 void keep_verified(const storage::BlobStore& blobs, ReportEvent& report) {
   for (CompletionClaim& claim : report.completions) {
     std::erase_if(claim.results, [&](const ShardResult& result) {
-      const bool is_there = blobs.has(result.digest);
+      const bool is_there = blobs.use(result.digest).has_value();
       if (!is_there) {
         spdlog::warn("worker={} job={} attempt={} shard={} event=result_without_blob digest={}",
                      report.worker, claim.job, claim.attempt, result.shard, result.digest.hex());

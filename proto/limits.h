@@ -25,6 +25,8 @@ inline constexpr std::size_t kLastLineLimitBytes = 256;
 inline constexpr std::size_t kLogChunkLimitBytes = std::size_t{64} << 10;
 inline constexpr std::uint64_t kAttemptLogLimitBytes = std::uint64_t{256} << 10;
 inline constexpr int kPiecesLimit = 4096;
+inline constexpr std::uint64_t kGraceLeastSeconds = 60;
+inline constexpr std::uint64_t kGraceLimitSeconds = std::uint64_t{10} * 365 * 24 * 3600;
 
 // Of connections. Each end asks the other whether it is there when nothing came for a while; a
 // server closes a connection that asks more often than kFastestPingMs.

@@ -104,6 +104,14 @@ core::Digest BlobStore::put(std::string_view data) {
   return digest;
 }
 
+bool BlobStore::put_checked(const core::Digest& digest, std::string_view data) {
+  if (use(digest) && get(digest)) {
+    return true;
+  }
+  put(data);
+  return false;
+}
+
 void BlobStore::adopt(const std::filesystem::path& file, const core::Digest& digest) {
   const std::filesystem::path path = path_of(digest);
   make_folder(path.parent_path());

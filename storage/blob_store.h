@@ -24,6 +24,9 @@ class BlobStore {
 
   // Stores `data` and returns its digest; durable on return. It counts as used now.
   core::Digest put(std::string_view data);
+  // The same, but what is there already is read, and written again when it is damaged. Says whether
+  // it was there. REQUIRES: `digest` is that of `data`.
+  bool put_checked(const core::Digest& digest, std::string_view data);
   // Takes over a file that is complete, in the same file system. REQUIRES: its bytes have the
   // digest.
   void adopt(const std::filesystem::path& file, const core::Digest& digest);

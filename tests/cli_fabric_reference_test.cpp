@@ -14,12 +14,32 @@ TEST(FabricReference, NamesWithAndWithoutVersionAreRead) {
   EXPECT_EQ(parse_reference("silk"), (FabricReference{"silk", std::nullopt}));
   EXPECT_EQ(parse_reference("silk@latest"), (FabricReference{"silk", std::nullopt}));
   EXPECT_EQ(parse_reference("satin_4-1@12"), (FabricReference{"satin_4-1", 12}));
+  EXPECT_EQ(parse_reference("silk:a-b_c.1"), (FabricReference{"silk", std::nullopt, "a-b_c.1"}));
 }
 
 TEST(FabricReference, WhatIsNoReferenceIsRefused) {
-  for (const char* text :
-       {"", "@", "@3", "silk@", "silk@0", "silk@03", "silk@-1", "silk@3x", "silk@Latest", "Silk",
-        "-silk", "silk.h5", "./silk", "a/b", "silk@3@4", "silk@9999999999999999999"}) {
+  for (const char* text : {"",
+                           "@",
+                           "@3",
+                           "silk@",
+                           "silk@0",
+                           "silk@03",
+                           "silk@-1",
+                           "silk@3x",
+                           "silk@Latest",
+                           "Silk",
+                           "-silk",
+                           "silk.h5",
+                           "./silk",
+                           "a/b",
+                           "silk@3@4",
+                           "silk@9999999999999999999",
+                           "silk:",
+                           "silk:3",
+                           "silk:latest",
+                           "silk:Good",
+                           "silk:a@1",
+                           "silk:a/b"}) {
     EXPECT_FALSE(parse_reference(text)) << text;
   }
   EXPECT_TRUE(parse_reference(std::string(64, 'a')));

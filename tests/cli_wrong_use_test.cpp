@@ -43,6 +43,12 @@ TEST(WrongUse, WithoutACoordinatorEveryCommandExitsWithFiveAndSaysHowToStartOne)
                   {nowhere({"fabrics"}), 5, "weft up"},
                   {nowhere({"versions", "silk"}), 5, "weft up"},
                   {nowhere({"fetch", "silk"}), 5, "weft up"},
+                  {nowhere({"log", "silk"}), 5, "weft up"},
+                  {nowhere({"diff", "silk@1", "silk@2"}), 5, "weft up"},
+                  {nowhere({"tag", "silk@1", "good"}), 5, "weft up"},
+                  {nowhere({"untag", "silk:good"}), 5, "weft up"},
+                  {nowhere({"rollback", "silk@1"}), 5, "weft up"},
+                  {nowhere({"gc"}), 5, "weft up"},
                   {nowhere({"watch", "j0"}), 5, "weft up"},
                   {nowhere({"cancel", "j0"}), 5, "weft up"},
                   {nowhere({"submit", tiny}), 5, "weft up"}});

@@ -9,7 +9,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "coordinator/catalogue.h"
 #include "coordinator/journal.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -382,68 +381,6 @@ TEST_F(JournalTest, FileOfANewerSchema_IsRefusedAndLeftAlone) {
     EXPECT_EQ(error.code(), core::Code::kFailedPrecondition);
     EXPECT_NE(std::string(error.what()).find("schema 99"), std::string::npos);
   }
-}
-
-class CatalogueTest : public JournalTest {
- protected:
-  Publication publication(const std::string& fabric, const std::string& content) {
-    const std::filesystem::path path = folder_ / "made.h5";
-    core::write_file_atomically(path, content);
-    return {fabric, core::digest_of(content), path, "j1", "a comment", 5};
-  }
-};
-
-TEST_F(CatalogueTest, Versions_AreNumberedAndKept) {
-  {
-    Journal journal(file());
-    Catalogue catalogue(journal, folder_ / "versions");
-    EXPECT_EQ(catalogue.publish(publication("silk", "one")).number, 1U);
-    EXPECT_EQ(catalogue.publish(publication("silk", "two")).number, 2U);
-    EXPECT_EQ(catalogue.publish(publication("wool", "one")).number, 1U);
-    EXPECT_FALSE(std::filesystem::exists(folder_ / "made.h5"));
-  }
-  Journal journal(file());
-  const Catalogue catalogue(journal, folder_ / "versions");
-  EXPECT_EQ(catalogue.find("silk").number, 2U);
-  EXPECT_EQ(catalogue.find("silk@latest").number, 2U);
-  const VersionRecord first = catalogue.find("silk@1");
-  EXPECT_EQ(first.comment, "a comment");
-  EXPECT_EQ(core::read_file(catalogue.path_of(first)), "one");
-  EXPECT_EQ(first.file, "silk-1-" + core::digest_of("one").hex().substr(0, 12) + ".h5");
-  EXPECT_EQ(catalogue.latest_versions().size(), 2U);
-  EXPECT_EQ(catalogue.versions("silk").size(), 2U);
-}
-
-TEST_F(CatalogueTest, EqualContentAsTheLatest_IsTheLatestVersion) {
-  Journal journal(file());
-  Catalogue catalogue(journal, folder_ / "versions");
-  catalogue.publish(publication("silk", "one"));
-  EXPECT_EQ(catalogue.publish(publication("silk", "one")).number, 1U);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "made.h5"));
-  catalogue.publish(publication("silk", "two"));
-  EXPECT_EQ(catalogue.publish(publication("silk", "one")).number, 3U);
-}
-
-TEST_F(CatalogueTest, WrongReferences_SayWhatThereIs) {
-  Journal journal(file());
-  Catalogue catalogue(journal, folder_ / "versions");
-  catalogue.publish(publication("silk", "one"));
-  const auto code_of = [&](const std::string& reference, const std::string& part) {
-    try {
-      (void)catalogue.find(reference);
-    } catch (const core::Error& error) {
-      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
-      return error.code();
-    }
-    return core::Code::kInternal;
-  };
-  EXPECT_EQ(code_of("wool", "published are: silk"), core::Code::kNotFound);
-  EXPECT_EQ(code_of("silk@2", "its latest is 1"), core::Code::kNotFound);
-  EXPECT_EQ(code_of("silk@", "NAME@NUMBER"), core::Code::kInvalidArgument);
-  EXPECT_EQ(code_of("silk@1x", "NAME@NUMBER"), core::Code::kInvalidArgument);
-  EXPECT_EQ(code_of("../silk", "NAME@NUMBER"), core::Code::kInvalidArgument);
-  EXPECT_EQ(code_of("", "NAME@NUMBER"), core::Code::kInvalidArgument);
-  EXPECT_THROW(catalogue.publish(publication("../silk", "one")), core::Error);
 }
 
 }  // namespace

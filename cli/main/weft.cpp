@@ -38,6 +38,12 @@ int main(int argc, char** argv) {
   cli::add_fabrics(app);
   cli::add_versions(app);
   cli::add_fetch(app);
+  cli::add_log(app);
+  cli::add_diff(app);
+  cli::add_tag(app);
+  cli::add_untag(app);
+  cli::add_rollback(app);
+  cli::add_gc(app);
   cli::add_inspect(app);
   cli::add_verify(app);
   cli::add_render(app);
