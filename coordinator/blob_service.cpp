@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include <spdlog/spdlog.h>
+
 #include "coordinator/messages.h"
 #include "coordinator/rpc.h"
 #include "core/clock.h"
@@ -88,28 +90,47 @@ grpc::Status BlobService::Write(grpc::ServerContext* context,
     if (!reader->Read(&request)) {
       return {grpc::StatusCode::INVALID_ARGUMENT, "the stream has no message"};
     }
-    const core::Digest digest = digest_from(request.digest(), "digest");
-    if (request.size_bytes() > v1::kBlobLimitBytes) {
-      return {grpc::StatusCode::RESOURCE_EXHAUSTED, "blob_bytes_limit: the blob has " +
-                                                        std::to_string(request.size_bytes()) +
-                                                        " bytes; the limit is 1 GiB"};
-    }
-    // One of another size is damaged, and is replaced.
-    if (scheduler_.blobs().use(digest) == request.size_bytes()) {
-      return grpc::Status::OK;
-    }
-    // Most results come in one message, and need no file for what has come.
-    if (request.offset() == 0 && request.data().size() == request.size_bytes() &&
-        request.data().size() <= v1::kChunkLimitBytes) {
-      if (core::digest_of(request.data()) != digest) {
-        return {grpc::StatusCode::DATA_LOSS,
-                "the bytes are not those of blob " + digest.hex() + "; nothing was stored"};
+    try {
+      return store(request, *reader);
+    } catch (const core::Error& error) {
+      // What the disk does not take is a short resource to the worker, which would try for ever
+      // after UNAVAILABLE. When the coordinator ends, the worker keeps it for the next one.
+      const bool is_disk = error.code() == core::Code::kUnavailable ||
+                           error.code() == core::Code::kResourceExhausted;
+      if (!is_disk) {
+        throw;
       }
-      scheduler_.blobs().put(request.data());
-      return grpc::Status::OK;
+      spdlog::warn("event=blob_not_stored message=\"{}\"", error.what());
+      const bool is_ending = scheduler_.fatal_problem().has_value();
+      throw core::Error(is_ending ? core::Code::kUnavailable : core::Code::kResourceExhausted,
+                        std::string("the coordinator cannot store a blob: ") + error.what());
     }
-    return receive(digest, request, *reader);
   });
+}
+
+grpc::Status BlobService::store(v1::WriteRequest& request,
+                                grpc::ServerReader<v1::WriteRequest>& reader) {
+  const core::Digest digest = digest_from(request.digest(), "digest");
+  if (request.size_bytes() > v1::kBlobLimitBytes) {
+    return {grpc::StatusCode::RESOURCE_EXHAUSTED, "blob_bytes_limit: the blob has " +
+                                                      std::to_string(request.size_bytes()) +
+                                                      " bytes; the limit is 1 GiB"};
+  }
+  // One of another size is damaged, and is replaced.
+  if (scheduler_.blobs().use(digest) == request.size_bytes()) {
+    return grpc::Status::OK;
+  }
+  // Most results come in one message, and need no file for what has come.
+  if (request.offset() == 0 && request.data().size() == request.size_bytes() &&
+      request.data().size() <= v1::kChunkLimitBytes) {
+    if (core::digest_of(request.data()) != digest) {
+      return {grpc::StatusCode::DATA_LOSS,
+              "the bytes are not those of blob " + digest.hex() + "; nothing was stored"};
+    }
+    scheduler_.blobs().put(request.data());
+    return grpc::Status::OK;
+  }
+  return receive(digest, request, reader);
 }
 
 grpc::Status BlobService::receive(const core::Digest& digest, v1::WriteRequest& request,

@@ -24,6 +24,7 @@ class BlobService final : public v1::BlobService::Service {
                      v1::WriteResponse* response) override;
 
  private:
+  grpc::Status store(v1::WriteRequest& request, grpc::ServerReader<v1::WriteRequest>& reader);
   grpc::Status receive(const core::Digest& digest, v1::WriteRequest& request,
                        grpc::ServerReader<v1::WriteRequest>& reader);
   void sweep_sometimes();

@@ -231,6 +231,22 @@ TEST_F(Faults, AWorkerWithAFullDiskIsShortOfAResourceUntilThereIsRoom) {
   EXPECT_TRUE(was_short) << "no attempt says that the disk was full";
 }
 
+TEST_F(Faults, ACoordinatorWithAFullDiskStopsAndGoesOnWhenThereIsRoom) {
+  FaultCluster cluster(folder_.path() / "full-journal", 2, "9");
+  cluster.start_worker(0);
+  cluster.start_worker(1);
+  cluster.submit(folder_, description_);
+  ASSERT_EQ(cluster.wait_for_transfer().ended_at_ms(), 0);
+  limit_files(cluster.coordinator(), 1000);
+  const auto code = cluster.coordinator().wait(60);
+  ASSERT_TRUE(code) << "it goes on though its journal cannot be written";
+  EXPECT_EQ(*code, 1);
+  cluster.start_coordinator();
+  const v1::Job job = cluster.wait_for_end();
+  expect_success(job);
+  expect_no_more_than_attempts(cluster, job);
+}
+
 TEST_F(Faults, AnswersThatAreLostChangeNothing) {
   FaultCluster cluster(folder_.path() / "answers", 2, "6");
   AnswerDropper proxy(cluster.address(), 7, 12);

@@ -1,6 +1,8 @@
+#include <filesystem>
 #include <string>
 #include <thread>
 
+#include "core/file.h"
 #include "tests/coordinator_service_fixture.h"
 
 // Uploads and downloads of blobs that break off, over a real connection.
@@ -93,6 +95,17 @@ TEST_F(Blobs, BrokenUploadGoesOnWhereItWas) {
 TEST_F(Blobs, UploadOfWhatIsThereSucceedsAtOnce) {
   ASSERT_TRUE(send(0, data_.size()).ok());
   EXPECT_TRUE(send(0, 1 << 16).ok()) << "without the rest of the bytes";
+}
+
+TEST_F(Blobs, DiskThatTakesNothingIsAShortResource) {
+  const std::filesystem::path in_the_way = folder_ / "state" / "blobs" / digest_.hex().substr(0, 2);
+  core::write_file_atomically(in_the_way, "no folder");
+  const grpc::Status status = send(0, data_.size());
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+  EXPECT_NE(status.error_message().find("cannot"), std::string::npos) << status.error_message();
+  std::filesystem::remove(in_the_way);
+  EXPECT_TRUE(send_when_free(0, data_.size()).ok());
+  EXPECT_TRUE(query().complete());
 }
 
 TEST_F(Blobs, SecondUploadAtOnceIsToldToWait) {
