@@ -3,6 +3,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -105,6 +106,17 @@ class FaultCluster {
     const grpc::Status status = jobs_->ListAttempts(&context, request, &response);
     EXPECT_TRUE(status.ok()) << status.error_message();
     return {response.attempts().begin(), response.attempts().end()};
+  }
+
+  // Prints what is known of a run that went wrong.
+  void tell_all() {
+    for (const v1::AttemptInfo& attempt : attempts()) {
+      std::printf("%s\n", attempt.ShortDebugString().c_str());
+    }
+    std::printf("%s", core::read_file(path("coordinator.log")).c_str());
+    for (std::size_t i = 0; i < workers_.size(); ++i) {
+      std::printf("worker-%zu:\n%s", i, worker_log(i).c_str());
+    }
   }
 
   static std::uint64_t shards_done(const v1::Job& job) {

@@ -3,9 +3,11 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -162,11 +164,19 @@ TEST_F(Faults, WhileTheCoordinatorIsAwayWorkersGoOnAndNothingIsDoneAgain) {
   const v1::Job job = cluster.wait_for_end();
   expect_success(job);
   expect_no_more_than_attempts(cluster, job);
-  for (const auto& [shard, times] : cluster.computed()) {
-    EXPECT_EQ(times, 1U) << shard.first << "/" << shard.second << " was computed again";
-  }
+  std::map<std::pair<std::string, std::uint64_t>, std::uint64_t> allowed;  // computed again
   for (const v1::AttemptInfo& attempt : cluster.attempts()) {
     EXPECT_NE(attempt.outcome(), "lost") << attempt.ShortDebugString();
+    // On a busy machine a run may be so slow that an idle worker is given it, too.
+    for (std::uint64_t i = 0; attempt.purpose() == "speculation" && i < attempt.shards(); ++i) {
+      ++allowed[{attempt.stage(), attempt.first_shard() + i}];
+    }
+  }
+  for (const auto& [shard, times] : cluster.computed()) {
+    EXPECT_LE(times, 1 + allowed[shard]) << shard.first << "/" << shard.second;
+  }
+  if (HasFailure()) {
+    cluster.tell_all();
   }
   const Finished logs = run_weft(
       folder_, {"logs", job.id(), "--task", "transfer", "--coordinator", cluster.address()});

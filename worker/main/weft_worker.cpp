@@ -27,6 +27,10 @@ namespace {
 
 constexpr unsigned kMiB = 1U << 20U;
 constexpr int kLongestReconnectMs = 2000;
+// How often gRPC looks at a connection that is being made while no call waits for it. Its own 5 s
+// come twice, for the connection and for the greeting on it, which is longer than a short lease.
+constexpr const char* kConnectionLook = "GRPC_CLIENT_CHANNEL_BACKUP_POLL_INTERVAL_MS";
+constexpr const char* kConnectionLookMs = "200";
 
 std::string host_name() {
   std::string name(256, '\0');
@@ -125,7 +129,9 @@ void work(Flags flags) {
   spdlog::set_default_logger(log);
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
   weft::security::log_what_grpc_says();
-  weft::core::Interrupt interrupt;  // before any thread is started
+  // Before gRPC, and before any thread is started.
+  ::setenv(kConnectionLook, kConnectionLookMs, 0);  // NOLINT(concurrency-mt-unsafe)
+  weft::core::Interrupt interrupt;
   // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
   std::signal(SIGXFSZ, SIG_IGN);
   flags.worker.coordinator = flags.coordinator.address;
