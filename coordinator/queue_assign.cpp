@@ -28,6 +28,14 @@ void Queue::assign(const ReportEvent& report, Time now, Actions& actions) {
   std::uint32_t free = report.free_attempts;
   // What the worker owns and did not list was in an answer that it never saw.
   for (const Attempt* const owned : attempts_of(report.worker)) {
+    if (job(owned->job)->fingerprint != report.fingerprint) {
+      // It was restored in a job that has been bound to workers of other numbers since.
+      const Attempt ended =
+          end_attempt(owned->id, Outcome::kStopped, "its worker has other numbers", now, actions);
+      release(ended, ended.losses, now);
+      actions.wake = true;
+      continue;
+    }
     ++held;
     const bool is_listed =
         std::any_of(report.running.begin(), report.running.end(),

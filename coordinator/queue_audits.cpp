@@ -167,7 +167,15 @@ void Queue::look_after_audits(JobState& job, StageState& stage, Time now) {
     }
     return;
   }
-  const std::set<std::string> names = eligible(job, stage, now);
+  // A worker that must end soon may never take any.
+  std::set<std::string> names;
+  for (const auto& [id, worker] : workers_) {
+    const Obstacle obstacle = hindrance(worker, job, stage, now).obstacle;
+    const bool is_for_a_while = obstacle >= Obstacle::kShort && obstacle != Obstacle::kWallTime;
+    if (obstacle == Obstacle::kNone || is_for_a_while) {
+      names.insert(worker.name);
+    }
+  }
   for (const std::uint64_t shard : stage.disputed) {
     Dispute& dispute = disputes_.at(stage.digests[shard]);
     const bool is_possible = std::any_of(names.begin(), names.end(), [&](const std::string& name) {

@@ -79,12 +79,29 @@ Queue::Recognised Queue::recognise(const std::string& job_id, std::uint64_t atte
     run->token = token;
     return Recognised::kYes;
   }
-  return job->is_planned ? Recognised::kNo : Recognised::kNotYet;
+  const bool is_complete = job->is_planned && !job->planning &&
+                           std::all_of(job->stages.begin(), job->stages.end(),
+                                       [](const StageState& stage) { return stage.is_done(); });
+  return is_complete ? Recognised::kNo : Recognised::kNotYet;
 }
 
 void Queue::on(const ReportEvent& event, Time now, Actions& actions) {
   expire(now, actions);
   enter(event, now, actions);
+  for (const Attempt* const held : attempts_of(event.worker)) {
+    const auto is_other_work = [&](const auto& claim) {
+      return claim.attempt == held->id && !is_about(*held, claim);
+    };
+    // It was restored after a restart, and what its worker does was made of what proved to be
+    // wrong.
+    if (std::any_of(event.running.begin(), event.running.end(), is_other_work) ||
+        std::any_of(event.completions.begin(), event.completions.end(), is_other_work)) {
+      const Attempt ended = end_attempt(held->id, Outcome::kStopped,
+                                        "what it was made of proved to be wrong", now, actions);
+      release(ended, ended.losses, now);
+      actions.wake = true;
+    }
+  }
   for (const CompletionClaim& claim : event.completions) {
     complete(event, claim, now, actions);
   }
@@ -295,6 +312,11 @@ void Queue::keep(const ReportEvent& report, const RunningClaim& claim, Time now,
     if (!is_adopted) {
       if (recognised == Recognised::kYes) {
         count_superseded(report, claim.job, claim.attempt);
+      } else if (recognised == Recognised::kNotYet && may_be_restored) {
+        // Its job is paused. It shall not be restored when its stage is planned after that.
+        actions.attempts_ended.push_back({claim.job, claim.attempt, Outcome::kStopped,
+                                          claim.shards_done, "its job was paused",
+                                          now.time_since_epoch().count()});
       }
       actions.reply.stop.push_back({claim.job, claim.attempt});
       return;

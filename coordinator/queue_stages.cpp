@@ -8,6 +8,24 @@
 
 namespace weft::coordinator {
 
+namespace {
+
+// The job's disputed shards of that work wait for another worker's word instead.
+void end_dispute(JobState& job, const core::Digest& work, Time now) {
+  for (StageState& stage : job.stages) {
+    const std::set<std::uint64_t> disputed = stage.disputed;
+    for (const std::uint64_t shard : disputed) {
+      if (stage.digests[shard] == work) {
+        stage.disputed.erase(shard);
+        stage.audits[stage.authors[shard]].add(shard);
+        stage.audits_possible_at = now;
+      }
+    }
+  }
+}
+
+}  // namespace
+
 std::uint64_t StageState::unconfirmed() const {
   std::uint64_t count = auditing.size() + disputed.size();
   for (const auto& [author, shards_due] : audits) {
@@ -56,7 +74,13 @@ void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& pl
     }
     const ShardRef ref{i, static_cast<std::uint32_t>(order), static_cast<std::uint32_t>(index)};
     add_ref(stage.digests[i], ref);
-    disputes_.erase(stage.digests[i]);  // its results are gone
+    const auto gone = disputes_.find(stage.digests[i]);
+    if (gone != disputes_.end()) {  // the result that it was about is
+      for (const std::uint64_t other : gone->second.jobs) {
+        end_dispute(jobs_.at(other), stage.digests[i], now);
+      }
+      disputes_.erase(gone);
+    }
     if (twins_ > 0 || stage.troubles.contains(i)) {
       stage.fresh.add(first, i - first);
       first = i + 1;

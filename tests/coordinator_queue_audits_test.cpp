@@ -152,6 +152,20 @@ TEST_F(QueueAudits, WithoutASecondName_AuditsAreGivenUpAndCounted) {
   EXPECT_EQ(job().audits_given_up, 2U);
 }
 
+TEST_F(QueueAudits, AWorkerThatMustEndSoon_IsNoReasonToWait) {
+  cluster_.submit_audited("a", {2}, 1);
+  work(first_);
+  second_.says().wall_left_ms = 20'000;  // a shard takes 30 s
+  for (int i = 0; i < 14 && !job().has_ended(); ++i) {
+    cluster_.advance(5'000);
+    first_.sync(1);
+    second_.sync(1);
+    ASSERT_TRUE(second_.held.empty());
+  }
+  EXPECT_EQ(job().phase, JobPhase::kSucceeded);
+  EXPECT_EQ(job().audits_given_up, 2U);
+}
+
 TEST_F(QueueAudits, ADisputeThatNobodyCanSettle_FailsTheJobAndKeepsNoResult) {
   cluster_.submit_audited("a", {1}, 1);
   work(first_, "a lie");

@@ -23,7 +23,10 @@ std::string text_of(const std::string& job, StageName stage, std::uint64_t shard
 
 }  // namespace
 
-void Checks::before(const Queue& queue, const Event& event, Time /*now*/) {
+void Checks::before(const Queue& queue, const Event& event, Time now) {
+  // When the clock jumped, leases last as long as they still had to.
+  has_jumped_ = now < last_ || now - last_ > std::chrono::milliseconds(settings_.stall_ms);
+  last_ = now;
   if (std::holds_alternative<ReportEvent>(event)) {
     before_ = queue.attempts();
   }
@@ -37,8 +40,31 @@ void Checks::after(const Queue& queue, const Event& event, const Actions& action
     check_assignments(queue, *report, actions);
     check_freed(queue, *report, actions, now);
   }
+  for (const std::string& id : actions.ended) {
+    check_troubles(*queue.job(id));
+  }
   check_state(queue);
   check_attempts(queue);
+}
+
+// A job that was given up says which of its shards are to blame, and on whose word.
+void Checks::check_troubles(const JobState& job) {
+  if (job.phase != JobPhase::kFailed) {
+    return;
+  }
+  require(!job.error.empty(), "{} failed and does not say why", job.id);
+  for (const StageState& stage : job.stages) {
+    for (std::size_t i = 0; i < stage.shards.size(); ++i) {
+      const bool is_named =
+          std::any_of(job.troubles.begin(), job.troubles.end(), [&](const Trouble& trouble) {
+            return trouble.kind != Trouble::Kind::kMismatch && trouble.stage == stage.name &&
+                   trouble.shard == i && !trouble.workers.empty() && !trouble.message.empty();
+          });
+      require(is_named == (stage.shards[i] == ShardState::kQuarantined),
+              "{} is {}quarantined and the job says otherwise", text_of(job.id, stage.name, i),
+              is_named ? "not " : "");
+    }
+  }
 }
 
 void Checks::coordinator_died() { accepted_.clear(); }
@@ -48,7 +74,10 @@ void Checks::unavailable(const core::Digest& work) {
   excused_.insert(work);
 }
 
-void Checks::loaded(const Queue& queue, const Tables& tables) { check_promises(tables, &queue); }
+void Checks::loaded(const Queue& queue, const Tables& tables) {
+  epoch_ = tables.epoch;
+  check_promises(tables, &queue);
+}
 
 // Each result is taken once: a second one is recorded only where the first was lost or dropped.
 void Checks::check_results(const Event& event, const Actions& actions) {
@@ -93,7 +122,8 @@ void Checks::check_assignments(const Queue& queue, const ReportEvent& report,
     } else {
       require(known->second.worker == report.worker && known->second.job == assign.job &&
                   known->second.first_shard == assign.first_shard &&
-                  known->second.works.size() == assign.shards,
+                  known->second.works.size() == assign.shards &&
+                  queue.job(assign.job)->fingerprint == report.fingerprint,
               "attempt {} of {} was {}'s and is assigned to {}", assign.attempt, assign.job,
               known->second.worker, report.worker);
     }
@@ -133,6 +163,12 @@ void Checks::check_new_assignment(const Queue& queue, const ReportEvent& report,
   require(stage != job->stages.end() && assign.shards > 0 &&
               assign.first_shard + assign.shards <= stage->shards.size(),
           "attempt {} of {} is not within its stage", assign.attempt, assign.job);
+  require(stage->memory_bytes <= report.memory_bytes, "{} {} needs more memory than {} has",
+          assign.job, to_string(assign.stage), report.name);
+  require(report.wall_left_ms == 0 || Queue::expected_ms(*stage, 1, report.threads) <=
+                                          static_cast<double>(report.wall_left_ms),
+          "{} is given {} {}, which takes longer than it is there", report.name, assign.job,
+          to_string(assign.stage));
   Given& given = given_[assign.attempt];
   given = {assign.job, assign.stage, assign.first_shard, {}, report.worker, assign.purpose, {}};
   for (std::uint64_t i = 0; i < assign.shards; ++i) {
@@ -148,6 +184,7 @@ void Checks::check_failures(const Queue& queue, const Event& event, const Action
     Verdicts& verdicts = verdicts_[{failure.job, failure.stage, failure.shard}];
     if (failure.kind != TroubleKind::kFailed) {
       verdicts.losses += failure.kind == TroubleKind::kLoneLoss ? 1 : 0;
+      verdicts.failures += failure.kind == TroubleKind::kHung ? 1 : 0;
       continue;
     }
     require(report != nullptr, "{} fails without a report",
@@ -157,7 +194,8 @@ void Checks::check_failures(const Queue& queue, const Event& event, const Action
           const auto attempt = before_.find(claim.attempt);
           return claim.failure && !claim.failure->resource_short && claim.job == failure.job &&
                  attempt != before_.end() && attempt->second.worker == report->worker &&
-                 attempt->second.token == claim.token && attempt->second.lease_until >= now;
+                 attempt->second.token == claim.token &&
+                 (has_jumped_ || attempt->second.lease_until >= now);
         });
     require(is_owner, "a superseded attempt fails {}",
             text_of(failure.job, failure.stage, failure.shard));
@@ -193,8 +231,8 @@ void Checks::check_freed(const Queue& queue, const ReportEvent& report, const Ac
                     [&](const CompletionClaim& claim) {
                       return claim.attempt == attempt.id && claim.token == attempt.token;
                     });
-    if (attempt.worker == report.worker || is_successor || attempt.lease_until < now ||
-        queue.attempts().contains(id)) {
+    if (attempt.worker == report.worker || is_successor || has_jumped_ ||
+        attempt.lease_until < now || queue.attempts().contains(id)) {
       continue;
     }
     const JobState* const job = queue.job(attempt.job);
@@ -208,8 +246,11 @@ void Checks::check_freed(const Queue& queue, const ReportEvent& report, const Ac
   }
 }
 
-void Checks::check_state(const Queue& queue) const {
+void Checks::check_state(const Queue& queue) {
   for (const JobState* const job : queue.jobs()) {
+    if (job->audits_given_up > 0) {
+      unaudited_.insert(job->id);
+    }
     for (const StageState& stage : job->stages) {
       std::uint64_t running = 0;
       std::uint64_t done = 0;
@@ -219,7 +260,7 @@ void Checks::check_state(const Queue& queue) const {
           ++done;
           const auto accepted = accepted_.find(stage.digests[i]);
           require(accepted == accepted_.end() || accepted->second == stage.results[i] ||
-                      job->has_ended(),
+                      job->has_ended() || excused_.contains(stage.digests[i]),
                   "{} has another result than was taken", text_of(job->id, stage.name, i));
         }
       }
@@ -232,7 +273,7 @@ void Checks::check_state(const Queue& queue) const {
 // Every running shard is run by an attempt with a lease; no shard, and no work, by two, but for
 // speculation and audits.
 void Checks::check_attempts(const Queue& queue) const {
-  std::map<core::Digest, int> firsts;
+  std::map<core::Digest, std::uint64_t> firsts;  // by work, the newest attempt
   std::map<std::string, std::map<std::size_t, std::set<std::uint64_t>>> covered;
   for (const auto& [id, attempt] : queue.attempts()) {
     const JobState* const job = queue.job(attempt.job);
@@ -243,10 +284,16 @@ void Checks::check_attempts(const Queue& queue) const {
     const auto given = given_.find(id);
     const bool is_first = given == given_.end() || given->second.purpose == Purpose::kFirst;
     for (std::uint64_t i = attempt.first_shard; i < attempt.first_shard + attempt.shards; ++i) {
+      if (attempt.skipped.contains(i)) {
+        continue;  // it ran before a restart, and another one began it before that was known again
+      }
       covered[attempt.job][attempt.stage].insert(i);
       if (is_first && stage.shards[i] == ShardState::kRunning) {
-        const int count = ++firsts[stage.digests[i]];
-        require(count == 1, "{} has two live attempts", text_of(job->id, stage.name, i));
+        // Two that skipped parts of one another are both restored after one more restart.
+        std::uint64_t& newest = firsts[stage.digests[i]];
+        require(newest == 0 || std::max(newest, id) >> 32 < epoch_, "{} has two live attempts",
+                text_of(job->id, stage.name, i));
+        newest = std::max(newest, id);
       }
     }
     require(given == given_.end() || given->second.worker == attempt.worker,

@@ -30,13 +30,18 @@ class Checks {
   void unavailable(const core::Digest& work);
   void loaded(const coordinator::Queue& queue, const Tables& tables);
 
-  // An answer to a worker leaves the coordinator.
-  void answered(const coordinator::ReportEvent& report, const coordinator::Reply& reply,
-                const Tables& durable, const coordinator::Queue& queue);
+  // The works of which the answer to a report acknowledges results that somebody wants.
+  [[nodiscard]] std::vector<core::Digest> acknowledged(const coordinator::ReportEvent& report,
+                                                       const coordinator::Reply& reply,
+                                                       const coordinator::Queue& queue) const;
+  // That answer leaves the coordinator.
+  void answered(const std::vector<core::Digest>& acknowledged, const coordinator::Reply& reply,
+                const Tables& durable) const;
 
   // A client has its answer.
   void submitted(const std::string& job) { submitted_.insert(job); }
   void cancelled(const std::string& job) { cancelled_.insert(job); }
+  void retried(const std::string& job) { cancelled_.erase(job); }
   // What the client was told last; nothing while a new order of that kind is under way.
   void paused(const std::string& job, std::optional<bool> is_paused);
   void drained(const std::string& worker, std::optional<bool> is_drained);
@@ -49,7 +54,8 @@ class Checks {
 
   // A shard's failures that counted, as the queue recorded them: whether a quarantine is deserved.
   [[nodiscard]] bool is_rightly_given_up(const std::string& job) const;
-  [[nodiscard]] const std::set<std::string>& acknowledged_jobs() const { return submitted_; }
+  // Whether results of the job were not audited for want of workers, or a dispute was not settled.
+  [[nodiscard]] bool is_unaudited(const std::string& job) const { return unaudited_.contains(job); }
   [[nodiscard]] std::uint64_t events() const { return events_; }
 
  private:
@@ -84,12 +90,17 @@ class Checks {
   void check_results(const coordinator::Event& event, const coordinator::Actions& actions);
   void check_freed(const coordinator::Queue& queue, const coordinator::ReportEvent& report,
                    const coordinator::Actions& actions, Time now);
-  void check_state(const coordinator::Queue& queue) const;
+  void check_state(const coordinator::Queue& queue);
+  [[nodiscard]] static bool is_wanted(const coordinator::JobState& job, const Given& given);
+  static void check_troubles(const coordinator::JobState& job);
   void check_attempts(const coordinator::Queue& queue) const;
 
   const Ground& ground_;
   const coordinator::QueueSettings settings_;
   std::uint64_t events_ = 0;
+  std::uint32_t epoch_ = 0;  // of the coordinator
+  Time last_{};
+  bool has_jumped_ = false;
   std::map<std::uint64_t, coordinator::Attempt> before_;  // the event
   std::map<std::uint64_t, Given> given_;                  // by attempt, of all epochs
   std::map<core::Digest, core::Digest> accepted_;         // work: result, as the queue knows it
@@ -97,6 +108,7 @@ class Checks {
   std::map<ShardName, Verdicts> verdicts_;
   std::set<std::string> submitted_;
   std::set<std::string> cancelled_;
+  std::set<std::string> unaudited_;
   std::map<std::string, bool> paused_;
   std::map<std::string, bool> drained_;
 };

@@ -56,7 +56,13 @@ void Client::cancel(const std::string& job, Then then) {
 }
 
 void Client::retry(const std::string& job, Then then) {
+  checks_.retried(job);
   insist([=, this](auto done) { coordinator_.retry(job, std::move(done)); }, std::move(then));
+}
+
+void Client::unblock(const std::string& worker, StageName stage, Then then) {
+  insist([=, this](auto done) { coordinator_.unblock(worker, stage, std::move(done)); },
+         std::move(then));
 }
 
 void Client::pause(const std::string& job, bool is_paused, Then then) {

@@ -22,6 +22,7 @@ class Client {
   void retry(const std::string& job, Then then);
   void pause(const std::string& job, bool is_paused, Then then);
   void prioritise(const std::string& job, std::int32_t priority, Then then);
+  void unblock(const std::string& worker, StageName stage, Then then);
   void drain(const std::string& worker, bool is_drained, Then then);
 
   // Orders that have no answer yet.

@@ -67,9 +67,11 @@ void CoordinatorModel::look(const std::string& worker, std::uint64_t sequence,
   HeldCall answered = std::move(call);
   process_->held.erase(found);
   v1::SynchronizeResponse response = message(reply);
-  when_durable(ticket, [this, answered = std::move(answered), response = std::move(response),
+  const std::vector<core::Digest> works =
+      checks_.acknowledged(answered.report, reply, process_->queue);
+  when_durable(ticket, [this, answered = std::move(answered), response = std::move(response), works,
                         reply = std::move(reply)] {
-    checks_.answered(answered.report, reply, journal_.durable(), process_->queue);
+    checks_.answered(works, reply, journal_.durable());
     answered.answer(&response);
   });
 }

@@ -88,8 +88,8 @@ void CoordinatorModel::load() {
   for (const std::string& name : tables.drained) {
     apply(DrainEvent{name, true}, nullptr);
   }
-  for (const auto& [worker, stage] : tables.blocks) {
-    apply(BlockEvent{worker, stage, true}, nullptr);
+  for (const auto& [block, is_liar] : tables.blocks) {
+    apply(BlockEvent{block.first, block.second, true, is_liar}, nullptr);
   }
   std::vector<JobRow> unfinished;
   for (const auto& [id, job] : tables.jobs) {
@@ -116,11 +116,28 @@ void CoordinatorModel::tick() {
   later(kTickMs, [this] { tick(); });
 }
 
+// What people who replay a seed want to know.
+void CoordinatorModel::tell(const Actions& actions) const {
+  for (const MismatchRecord& mismatch : actions.mismatches) {
+    ground_.say("{} {} shard {}: {} and {} differ; the liar is '{}'", mismatch.job,
+                to_string(mismatch.stage), mismatch.shard, mismatch.worker, mismatch.other_worker,
+                mismatch.liar);
+  }
+  for (const ResultDropRecord& drop : actions.results_dropped) {
+    ground_.say("the result of work {} is dropped", drop.shard.hex().substr(0, 8));
+  }
+  for (const BlockRecord& block : actions.blocks) {
+    ground_.say("{} is {} for {}", block.worker, block.is_blocked ? "blocked" : "unblocked",
+                to_string(block.stage));
+  }
+}
+
 std::uint64_t CoordinatorModel::apply(const Event& event, Reply* reply, std::vector<Row> rows) {
   Process& process = *process_;
   checks_.before(process.queue, event, now());
   Actions actions = process.queue.apply(event, now());
   checks_.after(process.queue, event, actions, now());
+  tell(actions);
   add_records(actions, rows);
   for (const std::string& id : actions.ended) {
     end_job(id, rows);
@@ -252,8 +269,8 @@ void CoordinatorModel::drain(const std::string& worker_name, bool is_drained, Do
 }
 
 void CoordinatorModel::unblock(const std::string& worker_name, StageName stage, Done done) {
-  const BlockRecord record{worker_name, stage, false};
-  when_durable(apply(BlockEvent{worker_name, stage, false}, nullptr, {record}), std::move(done));
+  ground_.say("{} is unblocked for {}", worker_name, to_string(stage));
+  when_durable(apply(BlockEvent{worker_name, stage, false}, nullptr), std::move(done));
 }
 
 }  // namespace weft::simulation

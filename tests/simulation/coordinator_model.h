@@ -102,6 +102,7 @@ class CoordinatorModel {
   void later(std::uint64_t delay_ms, Done action);
   std::uint64_t apply(const coordinator::Event& event, coordinator::Reply* reply,
                       std::vector<Row> rows = {});
+  void tell(const coordinator::Actions& actions) const;
   void end_job(const std::string& id, std::vector<Row>& rows);
   void when_durable(std::uint64_t ticket, Done done);
   void sync_when_idle();

@@ -126,6 +126,8 @@ PlannedStage CoordinatorModel::with_known(const std::string& job, const FakeStag
                                   attempt.worker_name, attempt.purpose});
     }
   }
+  const FakeFabric& fabric = process_->files.at(job).fabric;
+  planned.memory_bytes = stage.name == StageName::kTransfer ? fabric.transfer_bytes : 0;
   if (!stage.inputs.empty()) {
     planned.scene = stage.inputs.front();
   }

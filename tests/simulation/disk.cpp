@@ -68,7 +68,7 @@ struct Apply {
   }
   void operator()(const BlockRecord& row) const {
     if (row.is_blocked) {
-      tables.blocks.insert({row.worker, row.stage});
+      tables.blocks[{row.worker, row.stage}] = row.is_liar;
     } else {
       tables.blocks.erase({row.worker, row.stage});
     }

@@ -82,7 +82,7 @@ struct Tables {
   std::map<core::Digest, KeptResult> results;  // by work
   std::vector<coordinator::FailureRecord> failures;
   std::map<std::uint64_t, coordinator::AttemptRecord> attempts;  // that have not ended
-  std::set<std::pair<std::string, StageName>> blocks;
+  std::map<std::pair<std::string, StageName>, bool> blocks;      // whether for lies
   std::set<std::string> drained;
   std::vector<std::pair<std::string, core::Digest>> versions;  // fabric, database
 

@@ -23,6 +23,7 @@ struct FakeFabric {
   std::uint64_t visibility_shards = 1;
   std::uint64_t transfer_shards = 1;
   std::uint64_t shadow_shards = 1;
+  std::uint64_t transfer_bytes = 0;  // of memory, that a worker needs for a transfer run
 };
 
 struct FakeStage {

@@ -14,6 +14,7 @@ constexpr std::uint64_t kAnswerAllowanceMs = 10'000;
 constexpr std::uint64_t kLongestBackOffMs = 5'000;
 constexpr std::uint32_t kLongestWaitMs = 5'000;
 constexpr std::uint32_t kShortestWaitMs = 200;
+constexpr std::uint64_t kLeavingMs = 10'000;
 
 }  // namespace
 
@@ -32,6 +33,10 @@ void Machine::start() {
   ++life_;
   ++starts_;
   process_ = std::make_unique<Process>(character_.threads);
+  process_->started_ms = ground_.timeline.now_ms();
+  if (character_.wall_limit_ms > 0) {
+    later(character_.wall_limit_ms - kLeavingMs, [this] { leave(); });
+  }
   ground_.say("{} starts with {} attempts to report", worker_id(), spool_.size());
   take_over_spool();
   later(ground_.between(0, 100), [this] { synchronize(); });
@@ -64,6 +69,7 @@ void Machine::leave() {
     ground_.say("{} leaves", worker_id());
     process_->is_leaving = true;
     process_->table.drain();
+    later(kLeavingMs, [this] { end(); });
     attempt_is_over();
   }
 }
@@ -134,6 +140,11 @@ v1::SynchronizeRequest Machine::next_request() {
   request.set_fingerprint(character_.fingerprint.binary());
   request.set_leaving(process.is_leaving);
   request.set_wait_ms(process.is_leaving ? 0 : process.wait_ms);
+  if (character_.wall_limit_ms > 0) {
+    const std::uint64_t ran_ms = ground_.timeline.now_ms() - process.started_ms;
+    const std::uint64_t usable_ms = character_.wall_limit_ms - kLeavingMs;
+    request.set_wall_left_ms(usable_ms > ran_ms ? usable_ms - ran_ms : 1);
+  }
   for (const std::string& label : character_.labels) {
     request.add_labels(label);
   }

@@ -27,8 +27,9 @@ struct Character {
   std::uint64_t slowness = 1;
   core::Digest fingerprint;
   std::vector<std::string> labels;
-  std::optional<StageName> fails;  // every shard of this kind fails here, and only here
-  bool lies = false;               // its results are wrong
+  std::uint64_t wall_limit_ms = 0;  // its process ends by itself before; 0: it does not
+  std::optional<StageName> fails;   // every shard of this kind fails here, and only here
+  bool lies = false;                // its results are wrong
 };
 
 // Shards that are at fault themselves, wherever they run.
@@ -85,6 +86,7 @@ class Machine {
     std::uint32_t free_told = 0;
     bool is_leaving = false;
     std::uint32_t wait_ms = 1000;
+    std::uint64_t started_ms = 0;
   };
 
   void later(std::uint64_t delay_ms, std::function<void()> action);

@@ -27,6 +27,9 @@ bool has_work(const StageState& stage, const WorkerState& worker, Time now) {
   if (backoff != stage.backoffs.end() && now < backoff->second.until) {
     return false;
   }
+  if (stage.memory_bytes > worker.memory_bytes || worker.wall_left_ms > 0) {
+    return false;  // one that ends soon may be right to take nothing
+  }
   for (std::uint64_t i = 0; i < stage.shards.size(); ++i) {
     const auto trouble = stage.troubles.find(i);
     const bool is_free =
@@ -60,16 +63,21 @@ bool World::could_run(const JobState& job) const {
 
 std::string World::stuck_reason(const JobState& job) const {
   std::string text = job.is_paused ? "paused;" : "";
+  text += job.is_planned ? " planned;" : "";
   text += job.planning ? " planning;" : "";
   for (const StageState& stage : job.stages) {
-    text += fmt::format(" {} {}/{} done, {} running;", to_string(stage.name), stage.done,
-                        stage.shards.size(), stage.running);
+    text += fmt::format(" {} {}/{} done, {} running, {} disputed, {} unconfirmed;",
+                        to_string(stage.name), stage.done, stage.shards.size(), stage.running,
+                        stage.disputed.size(), stage.unconfirmed());
   }
   for (const auto& [id, attempt] : coordinator_.queue()->attempts()) {
-    if (attempt.job == job.id) {
+    const bool is_elsewhere = std::any_of(job.stages.begin(), job.stages.end(),
+                                          [](const auto& stage) { return stage.elsewhere > 0; });
+    if (attempt.job == job.id || is_elsewhere) {
       text += fmt::format(
-          " attempt {} of {} until {:.3f} s;", id, attempt.worker,
-          std::chrono::duration<double>(attempt.lease_until - coordinator_.now()).count());
+          " attempt {} of {} for {:.3f} s more, without progress for {:.3f} s;", id, attempt.worker,
+          std::chrono::duration<double>(attempt.lease_until - coordinator_.now()).count(),
+          std::chrono::duration<double>(coordinator_.now() - attempt.progress_at).count());
     }
   }
   return text;

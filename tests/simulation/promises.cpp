@@ -57,9 +57,19 @@ void Checks::check_promises(const Tables& tables, const Queue* queue) const {
   }
 }
 
-// A completion that is acknowledged is on the disk, as far as anybody wants it.
-void Checks::answered(const ReportEvent& report, const Reply& reply, const Tables& durable,
-                      const Queue& queue) {
+// Whether the job has just that work.
+bool Checks::is_wanted(const JobState& job, const Given& given) {
+  return std::any_of(job.stages.begin(), job.stages.end(), [&](const StageState& stage) {
+    return stage.name == given.stage &&
+           given.first_shard + given.works.size() <= stage.digests.size() &&
+           std::equal(given.works.begin(), given.works.end(),
+                      stage.digests.begin() + static_cast<std::ptrdiff_t>(given.first_shard));
+  });
+}
+
+std::vector<core::Digest> Checks::acknowledged(const ReportEvent& report, const Reply& reply,
+                                               const Queue& queue) const {
+  std::vector<core::Digest> works;
   for (const AttemptName& name : reply.acknowledged) {
     const auto claim =
         std::find_if(report.completions.begin(), report.completions.end(),
@@ -68,7 +78,10 @@ void Checks::answered(const ReportEvent& report, const Reply& reply, const Table
             name.attempt);
     const auto given = given_.find(name.attempt);
     const JobState* const job = queue.job(name.job);
-    if (given == given_.end() || job == nullptr) {
+    // A liar's results of that kind are not taken, nor any of a run of which a part was computed
+    // from what proved to be wrong.
+    if (given == given_.end() || job == nullptr || job->has_ended() ||
+        queue.is_liar(report.name, given->second.stage) || !is_wanted(*job, given->second)) {
       continue;
     }
     for (const ShardResult& result : claim->results) {
@@ -76,16 +89,18 @@ void Checks::answered(const ReportEvent& report, const Reply& reply, const Table
       if (result.shard < given->second.first_shard || index >= given->second.works.size()) {
         continue;
       }
-      const core::Digest& work = given->second.works[index];
-      const bool is_wanted =
-          std::any_of(job->stages.begin(), job->stages.end(), [&](const StageState& stage) {
-            return stage.name == given->second.stage && result.shard < stage.digests.size() &&
-                   stage.digests[result.shard] == work;
-          });
-      require(!is_wanted || durable.results.contains(work) || excused_.contains(work),
-              "{} {} shard {} of attempt {} is acknowledged and not on the disk", name.job,
-              to_string(given->second.stage), result.shard, name.attempt);
+      works.push_back(given->second.works[index]);
     }
+  }
+  return works;
+}
+
+// A completion that is acknowledged is on the disk, as far as anybody wants it.
+void Checks::answered(const std::vector<core::Digest>& acknowledged, const Reply& reply,
+                      const Tables& durable) const {
+  for (const core::Digest& work : acknowledged) {
+    require(durable.results.contains(work) || excused_.contains(work),
+            "work {} is acknowledged and not on the disk", work.hex().substr(0, 8));
   }
   for (const AssignAction& assign : reply.assignments) {
     const auto known = durable.jobs.find(assign.job);

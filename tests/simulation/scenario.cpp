@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "core/random.h"
 #include "tests/simulation/world.h"
 
@@ -66,6 +68,54 @@ std::vector<JobRow> jobs_of(Random& random) {
   return jobs;
 }
 
+// One machine that lies, or that fails what others can do; with enough honest ones beside it. Where
+// there is a liar, work is audited.
+void add_rogue(Random& random, Scenario& scenario) {
+  while (scenario.machines.size() < 4) {
+    scenario.machines.push_back(scenario.machines.front());
+    scenario.machines.back().name =
+        std::string("m").append(std::to_string(scenario.machines.size() - 1));
+  }
+  for (Character& machine : scenario.machines) {
+    machine.fingerprint = scenario.machines.front().fingerprint;
+  }
+  Character& rogue = scenario.machines.back();
+  if (happens(random, 0.5)) {
+    rogue.fails = happens(random, 0.5) ? StageName::kVisibility : StageName::kTransfer;
+    return;
+  }
+  rogue.lies = true;
+  for (JobRow& job : scenario.jobs) {
+    job.demands.audit = 1;
+  }
+  if (happens(random, 0.3)) {
+    scenario.jobs.front().demands.audit = 0;  // it may be deceived, the others not
+  }
+}
+
+// What some machines have and some jobs ask for. The first machine has it all, so that every job
+// can end.
+void add_demands(Random& random, Scenario& scenario) {
+  constexpr std::uint64_t kGib = std::uint64_t{1} << 30;
+  const bool needs_memory = happens(random, 0.5);
+  for (std::size_t i = 0; i < scenario.machines.size(); ++i) {
+    Character& machine = scenario.machines[i];
+    machine.fingerprint = scenario.machines.front().fingerprint;
+    machine.labels = {"linux"};
+    if (i == 0 || happens(random, 0.4)) {
+      machine.labels.emplace_back("large");
+    }
+    machine.memory_bytes = i == 0 || happens(random, 0.5) ? 8 * kGib : 2 * kGib;
+    machine.wall_limit_ms = i > 0 && happens(random, 0.4) ? between(random, 70'000, 200'000) : 0;
+  }
+  for (JobRow& job : scenario.jobs) {
+    if (happens(random, 0.5)) {
+      job.demands.labels = {"large"};
+    }
+    job.fabric.transfer_bytes = needs_memory ? 6 * kGib : 0;
+  }
+}
+
 }  // namespace
 
 Scenario scenario_of(std::uint64_t seed) {
@@ -83,9 +133,19 @@ Scenario scenario_of(std::uint64_t seed) {
   scenario.spoilt_blobs = happens(random, 0.3) ? between(random, 1, 6) : 0;
   scenario.has_clock_jumps = happens(random, 0.2);
   if (happens(random, 0.15)) {
+    add_rogue(random, scenario);
+  } else if (happens(random, 0.3)) {
+    add_demands(random, scenario);
+  }
+  const double audit = happens(random, 0.2) ? 0.2 + 0.8 * random.uniform() : 0;
+  for (JobRow& job : scenario.jobs) {
+    job.demands.audit = std::max(job.demands.audit, audit);
+  }
+  scenario.weather.hung_shards = happens(random, 0.15) ? 0.01 : 0;
+  if (happens(random, 0.15)) {
     constexpr const char* kStages[] = {"geometry", "visibility", "transfer"};
-    scenario.bad_shards.push_back(
-        {random.below(2) == 0 ? "silk" : "wool", kStages[random.below(3)], 0, false});
+    scenario.bad_shards.push_back({random.below(2) == 0 ? "silk" : "wool", kStages[random.below(3)],
+                                   0, happens(random, 0.3)});
   }
   return scenario;
 }

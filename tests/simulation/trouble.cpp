@@ -14,20 +14,34 @@ void World::arrange_jobs() {
   }
 }
 
-// Some jobs are paused for a while, some are cancelled, some are urgent all of a sudden.
+// Some jobs are paused for a while, some are cancelled, some are urgent all of a sudden, some are
+// tried again.
 void World::arrange_orders(const std::string& job) {
   const std::uint64_t wait_ms = ground_.between(0, 60'000);
-  if (ground_.happens(0.2)) {
+  const bool is_paused = ground_.happens(0.2);
+  const bool is_cancelled = !is_paused && ground_.happens(0.12);
+  if (is_paused) {
     ground_.timeline.after(wait_ms, [this, job] {
       client_.pause(job, true, [this, job] {
         ground_.timeline.after(ground_.between(0, 60'000),
                                [this, job] { client_.pause(job, false, [] {}); });
       });
     });
-  } else if (ground_.happens(0.12)) {
-    ground_.timeline.after(wait_ms, [this, job] { client_.cancel(job, [] {}); });
+  } else if (is_cancelled) {
+    ground_.timeline.after(wait_ms, [this, job, is_regretted = ground_.happens(0.5)] {
+      client_.cancel(job, [this, job, is_regretted] {
+        if (is_regretted) {
+          ground_.timeline.after(ground_.between(0, 30'000),
+                                 [this, job] { client_.retry(job, [] {}); });
+        }
+      });
+    });
   } else if (ground_.happens(0.2)) {
     ground_.timeline.after(wait_ms, [this, job] { client_.prioritise(job, 50, [] {}); });
+  }
+  if (!is_cancelled && !is_paused && ground_.happens(0.3)) {  // in case it has failed
+    ground_.timeline.after(ground_.between(20'000, 150'000),
+                           [this, job] { client_.retry(job, [] {}); });
   }
 }
 
@@ -39,6 +53,14 @@ void World::arrange_drains() {
         ground_.timeline.after(ground_.between(0, 60'000),
                                [this, name] { client_.drain(name, false, [] {}); });
       });
+    });
+  }
+  const Character& last = scenario_.machines.back();
+  if ((last.lies || last.fails) && ground_.happens(0.5)) {
+    // Somebody believes that it is mended.
+    const StageName stage = last.fails.value_or(StageName::kVisibility);
+    ground_.timeline.after(ground_.between(20'000, 150'000), [this, name = last.name, stage] {
+      client_.unblock(name, stage, [] {});
     });
   }
 }

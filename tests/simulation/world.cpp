@@ -142,13 +142,16 @@ void World::check_ends() const {
   if (!coordinator_.queue()->attempts().empty()) {
     throw Violation("all jobs have ended and there are attempts");
   }
+  const bool has_liar = std::any_of(scenario_.machines.begin(), scenario_.machines.end(),
+                                    [](const Character& machine) { return machine.lies; });
   for (const auto& [id, job] : durable.jobs) {
     const bool is_bad = std::any_of(
         scenario_.bad_shards.begin(), scenario_.bad_shards.end(),
         [&, &cloth = job.fabric.cloth](const BadShard& bad) { return bad.cloth == cloth; });
     switch (job.end) {
       case End::kSucceeded:
-        if (job.database != undisturbed(job.fabric, *job.fingerprint)) {
+        if (job.database != undisturbed(job.fabric, *job.fingerprint) &&
+            !(has_liar && (job.demands.audit < 1 || checks_.is_unaudited(id)))) {
           throw Violation(id + "'s database is not the one of a cluster without faults");
         }
         if (is_bad) {
@@ -156,7 +159,9 @@ void World::check_ends() const {
         }
         break;
       case End::kFailed:
-        if (!is_bad && !checks_.is_rightly_given_up(id)) {
+        if (!is_bad &&
+            !(has_liar && job.error.find("has different results") != std::string::npos) &&
+            !checks_.is_rightly_given_up(id)) {
           throw Violation(id + " was given up for no good reason: " + job.error);
         }
         if (job.error.empty()) {
