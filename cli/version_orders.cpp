@@ -1,4 +1,5 @@
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -9,8 +10,8 @@
 #include "cli/fabric_reference.h"
 #include "cli/present.h"
 #include "cli/print_json.h"
-#include "core/error.h"
 #include "proto/limits.h"
+#include "proto/names.h"
 
 // What people order of published versions: names for them, and a step back.
 
@@ -44,10 +45,33 @@ struct VersionOptions {
   bool wants_json = false;
 };
 
+std::string mistake_in_tag(const std::string& text) {
+  return v1::is_tag(text) ? std::string()
+                          : "'" + text +
+                                "' is no tag; a tag is 1 to 64 characters of a-z, 0-9, _, . and -, "
+                                "begins with a "
+                                "letter or digit, and is neither a number nor 'latest'";
+}
+
+std::string mistake_in_tagged(const std::string& text) {
+  const std::optional<FabricReference> reference = parse_reference(text);
+  return reference && !reference->tag.empty() ? std::string()
+                                              : "'" + text + "' names no tag; write NAME:TAG";
+}
+
+std::string mistake_in_older(const std::string& text) {
+  const std::optional<FabricReference> reference = parse_reference(text);
+  if (reference && !reference->version && reference->tag.empty()) {
+    return "'" + text + "' is the latest already; name an older version, NAME@NUMBER or NAME:TAG";
+  }
+  return mistake_in_reference(text);
+}
+
 CLI::App* add_order(CLI::App& app, const std::string& name, const char* help,
-                    const std::shared_ptr<VersionOptions>& options, const std::string& what) {
+                    const std::shared_ptr<VersionOptions>& options, const std::string& what,
+                    std::string (*mistake)(const std::string&)) {
   CLI::App* command = add_command(app, name, help);
-  command->add_option("version", options->reference, what)->required()->check(mistake_in_reference);
+  command->add_option("version", options->reference, what)->required()->check(mistake);
   add_coordinator_option(*command, options->coordinator);
   command->add_flag("--json", options->wants_json, "Print the version as one JSON value on stdout");
   return command;
@@ -81,10 +105,6 @@ void run_tag(const VersionOptions& options) {
 
 void run_untag(const VersionOptions& options) {
   const FabricReference reference = *parse_reference(options.reference);
-  if (reference.tag.empty()) {
-    throw core::Error(core::Code::kInvalidArgument,
-                      "'" + options.reference + "' names no tag; write NAME:TAG");
-  }
   v1::TagVersionRequest request;
   request.set_request_id(new_request_id());
   request.set_fabric(reference.name);
@@ -95,13 +115,6 @@ void run_untag(const VersionOptions& options) {
 }
 
 void run_rollback(const VersionOptions& options) {
-  const FabricReference reference = *parse_reference(options.reference);
-  if (!reference.version && reference.tag.empty()) {
-    throw core::Error(
-        core::Code::kInvalidArgument,
-        "'" + options.reference +
-            "' is the latest already; name an older version, NAME@NUMBER or NAME:TAG");
-  }
   Client client(options.coordinator);
   v1::RollBackRequest request;
   request.set_request_id(new_request_id());
@@ -120,21 +133,25 @@ void run_rollback(const VersionOptions& options) {
 
 void add_tag(CLI::App& app) {
   auto options = std::make_shared<VersionOptions>();
-  CLI::App* command = add_order(app, "tag", kTagHelp, options, "Which version, like silk@3");
-  command->add_option("tag", options->tag, "Its further name, like approved")->required();
+  CLI::App* command =
+      add_order(app, "tag", kTagHelp, options, "Which version, like silk@3", mistake_in_reference);
+  command->add_option("tag", options->tag, "Its further name, like approved")
+      ->required()
+      ->check(mistake_in_tag);
   command->callback([options] { run_tag(*options); });
 }
 
 void add_untag(CLI::App& app) {
   auto options = std::make_shared<VersionOptions>();
-  CLI::App* command = add_order(app, "untag", kUntagHelp, options, "The tag, like silk:approved");
+  CLI::App* command = add_order(app, "untag", kUntagHelp, options, "The tag, like silk:approved",
+                                mistake_in_tagged);
   command->callback([options] { run_untag(*options); });
 }
 
 void add_rollback(CLI::App& app) {
   auto options = std::make_shared<VersionOptions>();
-  CLI::App* command =
-      add_order(app, "rollback", kRollbackHelp, options, "Which version, like silk@2");
+  CLI::App* command = add_order(app, "rollback", kRollbackHelp, options,
+                                "Which version, like silk@2", mistake_in_older);
   command->add_option("--comment", options->comment, "A line kept in the history (1024 bytes)")
       ->check([](const std::string& text) {
         return text.size() <= v1::kCommentLimitBytes ? std::string()

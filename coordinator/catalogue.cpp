@@ -68,12 +68,15 @@ VersionRecord Catalogue::find(const std::string& reference) const {
                           "' names no version; write NAME, NAME@latest, NAME@NUMBER or NAME:TAG, "
                           "where NAME is of a-z, 0-9, _ and -");
   }
-  const std::vector<VersionRecord> versions = journal_.versions(name);
+  // The number first: what it names is among the versions that are listed then, whatever is
+  // published in between.
+  const std::uint64_t latest = journal_.latest_number(name);
+  const std::vector<VersionRecord> versions =
+      latest == 0 ? std::vector<VersionRecord>() : journal_.versions(name);
   if (versions.empty()) {
     throw core::Error(core::Code::kNotFound, "there is no fabric named '" + name + "'; " +
                                                  names_of(journal_.latest_versions()));
   }
-  const std::uint64_t latest = journal_.latest_number(name);
   const VersionRecord* const found =
       names_tag ? find_tag(versions, which) : find_number(versions, names_number ? number : latest);
   if (found == nullptr) {

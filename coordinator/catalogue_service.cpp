@@ -17,7 +17,8 @@ CatalogueOrder order_of(const std::string& request_id, const security::Caller& c
   if (comment.size() > v1::kCommentLimitBytes) {
     throw core::Error(core::Code::kInvalidArgument, "comment is longer than 1024 bytes");
   }
-  return {request_id, caller.user, comment, to_ms(core::system_clock().now())};
+  const std::string user = caller.user.empty() ? "nobody" : caller.user;
+  return {request_id, user, comment, to_ms(core::system_clock().now())};
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -193,6 +195,31 @@ TEST_F(CatalogueTest, RollingBack_MakesAnOlderVersionTheLatestUntilTheNext) {
   EXPECT_EQ(catalogue_->history("silk", 2).at(1).comment, "why");
 }
 
+TEST_F(CatalogueTest, ReaderSeesOneVersionOrTheNextWhileTheyArePublished) {
+  std::vector<Publication> made;
+  for (int i = 0; i < 30; ++i) {
+    made.push_back(publication("silk", std::string("content ").append(std::to_string(i)),
+                               std::string("j").append(std::to_string(i))));
+    catalogue_->prepare(made.back());
+  }
+  catalogue_->publish(made[0]);
+  std::atomic<bool> is_over{false};
+  std::thread reader([&] {
+    std::uint64_t seen = 1;
+    while (!is_over) {
+      const VersionRecord version = catalogue_->find("silk");
+      EXPECT_GE(version.number, seen);
+      EXPECT_EQ(read(version), std::string("content ").append(std::to_string(version.number - 1)));
+      seen = version.number;
+    }
+  });
+  for (std::size_t i = 1; i < made.size(); ++i) {
+    EXPECT_EQ(catalogue_->publish(made[i]).number, i + 1);
+  }
+  is_over = true;
+  reader.join();
+}
+
 TEST_F(CatalogueTest, WrongReferences_SayWhatThereIs) {
   publish("silk", content_of("one"), "j1");
   const auto find = [&](const std::string& reference, const std::string& part) {
@@ -267,7 +294,8 @@ TEST_F(CatalogueTest, VersionOfAnOlderWeft_IsServedAndCutWhenItIsAskedFor) {
 TEST_F(CatalogueTest, WholeFiles_ArePutTogetherForWhoeverReadsThem) {
   std::vector<VersionRecord> versions;
   for (int i = 0; i < 7; ++i) {
-    versions.push_back(publish("silk", content_of(std::to_string(i)), "j" + std::to_string(i)));
+    versions.push_back(
+        publish("silk", content_of(std::to_string(i)), std::string("j").append(std::to_string(i))));
   }
   for (const VersionRecord& version : versions) {
     catalogue_->with_files({version, versions[0]},
