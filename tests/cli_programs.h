@@ -27,6 +27,8 @@ class TestFolder {
     std::string name = (std::filesystem::temp_directory_path() / "weft-test-XXXXXX").string();
     EXPECT_NE(mkdtemp(name.data()), nullptr);
     path_ = name;
+    // What this user fetched before must not help, and what is fetched here goes with the folder.
+    setenv("XDG_CACHE_HOME", (path_ / "cache").c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
   }
   ~TestFolder() {
     std::error_code ignored;
