@@ -312,6 +312,9 @@ class Queue {
   std::set<std::pair<Time, std::uint64_t>> leases_;  // by their ends
   std::map<std::string, std::set<std::uint64_t>> attempts_of_worker_;  // by the worker's id
   std::map<std::uint64_t, LostAttempt> lost_;
+  // Attempts of earlier epochs that ended in this one for another reason than silence: they are not
+  // taken up again.
+  std::set<std::uint64_t> ended_for_good_;
   std::set<std::uint64_t> slow_;  // attempts that an idle worker may try to outrun
 
   // The unfinished shards of all jobs, by the digest of their work; and how many of them have the

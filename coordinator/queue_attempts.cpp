@@ -51,6 +51,9 @@ Attempt Queue::end_attempt(std::uint64_t id, Outcome outcome, const std::string&
   Attempt attempt = std::move(entry->second);
   attempts_.erase(entry);
   leases_.erase({attempt.lease_until, id});
+  if (outcome != Outcome::kLost && id >> 32 < next_attempt_ >> 32) {
+    ended_for_good_.insert(id);
+  }
   slow_.erase(id);
   find_job(attempt.job)->stages[attempt.stage].attempts.erase(id);
   const auto held = attempts_of_worker_.find(attempt.worker);

@@ -364,7 +364,7 @@ bool Queue::is_needed(const Attempt& attempt) const {
 bool Queue::adopt(const Attempt& run, const std::string& worker, Time now, Actions& actions) {
   const auto lost = lost_.find(run.id);
   const bool was_lost = lost != lost_.end() && lost->second.worker == worker;
-  const bool is_older = run.id >> 32 < next_attempt_ >> 32;
+  const bool is_older = run.id >> 32 < next_attempt_ >> 32 && !ended_for_good_.contains(run.id);
   JobState& job = *find_job(run.job);
   StageState& stage = job.stages[run.stage];
   if ((!was_lost && !is_older) || attempts_.contains(run.id) || job.is_paused ||
