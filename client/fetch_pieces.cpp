@@ -28,7 +28,7 @@ class PieceStream {
       request.add_digests(piece.digest.binary());
       bytes += piece.size_bytes;
     }
-    allow(context_, bytes);
+    set_deadline(context_, bytes);
     reader_ = coordinator.catalogue().ReadPieces(&context_, request);
   }
   ~PieceStream() {
@@ -93,7 +93,7 @@ class PieceStream {
 
 }  // namespace
 
-void allow(grpc::ClientContext& context, std::uint64_t bytes) {
+void set_deadline(grpc::ClientContext& context, std::uint64_t bytes) {
   Coordinator::set_deadline(
       context, kStreamAllowance + std::chrono::seconds(bytes / kSlowestBytesPerSecond));
 }

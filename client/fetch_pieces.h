@@ -15,7 +15,7 @@
 namespace weft::client {
 
 // Gives a stream of so many bytes as long as a slow line needs; one that takes longer hangs.
-void allow(grpc::ClientContext& context, std::uint64_t bytes);
+void set_deadline(grpc::ClientContext& context, std::uint64_t bytes);
 
 // Waits between tries of a stream that breaks off, and ends them when nothing comes any more.
 class Patience {

@@ -23,7 +23,7 @@ grpc::Status stream_rest(Coordinator& coordinator, const v1::Version& version, P
   request.set_reference(reference_text(version));
   request.set_offset(part.size_bytes());
   grpc::ClientContext context;
-  allow(context, version.size_bytes());
+  set_deadline(context, version.size_bytes());
   const auto reader = coordinator.catalogue().FetchVersion(&context, request);
   v1::FetchVersionResponse response;
   while (reader->Read(&response)) {
