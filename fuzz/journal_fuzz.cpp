@@ -9,6 +9,7 @@
 #include "coordinator/scheduler.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "fuzz/own_folder.h"
 #include "fuzz/target.h"
 
 namespace {
@@ -19,13 +20,8 @@ namespace coordinator = weft::coordinator;
 const std::filesystem::path& folder() {
   static const std::filesystem::path path = [] {
     spdlog::set_level(spdlog::level::off);
-    const bool has_shm = std::filesystem::is_directory("/dev/shm");
-    std::string name = has_shm ? "/dev/shm/weft_fuzz_XXXXXX" : "/tmp/weft_fuzz_XXXXXX";
-    if (::mkdtemp(name.data()) == nullptr) {
-      std::abort();
-    }
     (void)std::atexit([] { std::filesystem::remove_all(folder()); });
-    return std::filesystem::path(name);
+    return weft::fuzz::make_own_folder();
   }();
   return path;
 }

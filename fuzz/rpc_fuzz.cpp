@@ -17,6 +17,7 @@
 #include "core/clock.h"
 #include "core/digest.h"
 #include "core/file.h"
+#include "fuzz/own_folder.h"
 #include "fuzz/target.h"
 #include "proto/weft/v1/cluster.pb.h"
 
@@ -54,18 +55,14 @@ weft::core::Digest made_up_commit(const weft::v1::FabricDescription&,
 class Cluster {
  public:
   Cluster() {
-    const bool has_shm = std::filesystem::is_directory("/dev/shm");
-    std::string name = has_shm ? "/dev/shm/weft_rpc_XXXXXX" : "/tmp/weft_rpc_XXXXXX";
-    if (::mkdtemp(name.data()) == nullptr) {
-      std::abort();
-    }
-    folder_ = name;
+    folder_ = weft::fuzz::make_own_folder();
     coordinator::SchedulerOptions options;
     options.state_folder = folder_ / "state";
     options.commit = made_up_commit;
     scheduler_ =
         std::make_unique<coordinator::Scheduler>(std::move(options), weft::core::system_clock());
-    server_ = std::make_unique<coordinator::Server>(*scheduler_, "unix:" + name + "/socket");
+    server_ =
+        std::make_unique<coordinator::Server>(*scheduler_, "unix:" + (folder_ / "socket").string());
     stub_ = std::make_unique<grpc::GenericStub>(
         grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
   }

@@ -8,6 +8,7 @@
 
 #include "core/digest.h"
 #include "core/error.h"
+#include "fuzz/own_folder.h"
 #include "fuzz/target.h"
 #include "worker/spool_folder.h"
 
@@ -16,13 +17,8 @@ namespace {
 const std::filesystem::path& folder() {
   static const std::filesystem::path path = [] {
     spdlog::set_level(spdlog::level::off);
-    const bool has_shm = std::filesystem::is_directory("/dev/shm");
-    std::string name = has_shm ? "/dev/shm/weft_spool_XXXXXX" : "/tmp/weft_spool_XXXXXX";
-    if (::mkdtemp(name.data()) == nullptr) {
-      std::abort();
-    }
     (void)std::atexit([] { std::filesystem::remove_all(folder()); });
-    return std::filesystem::path(name);
+    return weft::fuzz::make_own_folder();
   }();
   return path;
 }
