@@ -4,7 +4,7 @@
 
 #include <malloc.h>
 
-#include "coordinator/queue.h"
+#include "coordinator/queue/queue.h"
 #include "core/clock.h"
 #include "core/digest.h"
 

@@ -12,8 +12,8 @@
 #include <thread>
 #include <utility>
 
-#include "coordinator/commit.h"
 #include "coordinator/plan.h"
+#include "coordinator/versions/commit.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "worker/baker.h"

@@ -8,10 +8,10 @@
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
 
-#include "coordinator/blob_service.h"
-#include "coordinator/catalogue_service.h"
-#include "coordinator/job_service.h"
-#include "coordinator/worker_service.h"
+#include "coordinator/services/blob_service.h"
+#include "coordinator/services/catalogue_service.h"
+#include "coordinator/services/job_service.h"
+#include "coordinator/services/worker_service.h"
 #include "proto/limits.h"
 #include "security/server_gate.h"
 

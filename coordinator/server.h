@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "coordinator/scheduler.h"
+#include "coordinator/scheduler/scheduler.h"
 #include "security/endpoint.h"
 
 namespace weft::coordinator {

@@ -11,7 +11,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
-#include "coordinator/scheduler.h"
+#include "coordinator/scheduler/scheduler.h"
 #include "core/clock.h"
 #include "core/file.h"
 #include "core/flat.h"

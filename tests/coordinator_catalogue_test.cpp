@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "coordinator/catalogue.h"
+#include "coordinator/versions/catalogue.h"
 #include "core/error.h"
 #include "core/file.h"
 

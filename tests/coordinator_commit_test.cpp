@@ -10,8 +10,8 @@
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
-#include "coordinator/commit.h"
-#include "coordinator/result_folding.h"
+#include "coordinator/versions/commit.h"
+#include "coordinator/versions/result_folding.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/half.h"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "coordinator/description_changes.h"
+#include "coordinator/versions/description_changes.h"
 #include "tests/coordinator_fabric.h"
 
 namespace weft::coordinator {

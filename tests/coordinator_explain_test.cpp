@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "coordinator/explain.h"
+#include "coordinator/queue/explain.h"
 #include "tests/queue_cluster.h"
 
 namespace weft::coordinator {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "coordinator/garbage.h"
+#include "coordinator/scheduler/garbage.h"
 #include "tests/coordinator_service_fixture.h"
 
 // What is collected and what is not, and versions that lose their pieces, with jobs that run.

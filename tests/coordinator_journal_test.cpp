@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "coordinator/journal.h"
+#include "coordinator/journal/journal.h"
 #include "core/error.h"
 #include "core/file.h"
 

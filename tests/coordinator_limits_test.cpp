@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "coordinator/open_streams.h"
+#include "coordinator/services/open_streams.h"
 #include "core/error.h"
 #include "proto/limits.h"
 #include "tests/coordinator_service_fixture.h"

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/log_service.h"
+#include "coordinator/services/log_service.h"
 #include "proto/limits.h"
 #include "tests/coordinator_service_fixture.h"
 

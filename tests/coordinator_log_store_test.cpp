@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "coordinator/log_store.h"
+#include "coordinator/scheduler/log_store.h"
 #include "core/error.h"
 
 namespace weft::coordinator {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "coordinator/queue.h"
+#include "coordinator/queue/queue.h"
 #include "tests/queue_cluster.h"
 
 namespace weft::coordinator {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "coordinator/scheduler.h"
+#include "coordinator/scheduler/scheduler.h"
 #include "coordinator/server.h"
 #include "core/clock.h"
 #include "security/caller.h"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "coordinator/waiting_calls.h"
+#include "coordinator/scheduler/waiting_calls.h"
 
 namespace weft::coordinator {
 namespace {

@@ -23,6 +23,9 @@ MAY_INCLUDE = {
 }
 MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
 
+# Folders inside a folder, each of which may include those before it.
+ORDER = {"coordinator": ["queue", "journal", "versions", "scheduler", "services"]}
+
 # Third-party header -> the files that alone include it.
 BEHIND = {
     r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_reader.cpp", "storage/h5_types.cpp"},
@@ -30,7 +33,7 @@ BEHIND = {
     r"(OpenEXR/)?Imf.*": {"render/image.cpp", "render/files/exr_parser.cpp"},
     r"png\.h": {"render/png.cpp", "render/files/png_parser.cpp"},
     r"vulkan/.*": {"render/gpu/vulkan.h"},
-    r"sqlite3\.h": {"coordinator/sqlite.cpp"},
+    r"sqlite3\.h": {"coordinator/journal/sqlite.cpp"},
     r"tiny_obj_loader\.h": {"render/files/obj_parser.cpp"},
     r"openssl/.*": {"core/digest.cpp", "security/x509.cpp", "security/tls_probe.cpp"},
     r"Random123/.*": {"core/random.h"},
@@ -56,6 +59,11 @@ def mistakes_of(root: pathlib.Path):
                     yield f"{where}: '{target}' is not a full path from the root"
                 if first in MAY_INCLUDE and first != folder and first not in allowed:
                     yield f"{where}: {folder} may not include {first} ({target})"
+                inner, including = ORDER.get(folder, []), name.split("/")[1]
+                included = target.split("/")[1] if first == folder else ""
+                if including in inner and included in inner:
+                    if inner.index(included) > inner.index(including):
+                        yield f"{where}: {folder}/{including} may not include {included} ({target})"
                 for pattern, owners in BEHIND.items():
                     if re.fullmatch(pattern, target) and name not in owners:
                         yield f"{where}: {target} belongs behind {', '.join(sorted(owners))}"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/queue.h"
+#include "coordinator/queue/queue.h"
 #include "core/digest.h"
 
 namespace weft::coordinator {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "coordinator/queue.h"
+#include "coordinator/queue/queue.h"
 
 namespace weft::coordinator {
 

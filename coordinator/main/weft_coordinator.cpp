@@ -8,9 +8,9 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include "coordinator/commit.h"
-#include "coordinator/scheduler.h"
+#include "coordinator/scheduler/scheduler.h"
 #include "coordinator/server.h"
+#include "coordinator/versions/commit.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "security/endpoint_options.h"

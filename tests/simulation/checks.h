@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/queue.h"
+#include "coordinator/queue/queue.h"
 #include "tests/simulation/disk.h"
 #include "tests/simulation/ground.h"
 

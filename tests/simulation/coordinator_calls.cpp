@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "coordinator/messages.h"
+#include "coordinator/scheduler/messages.h"
 #include "core/check.h"
 #include "tests/simulation/coordinator_model.h"
 

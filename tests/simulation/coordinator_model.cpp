@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "coordinator/records.h"
+#include "coordinator/journal/records_of.h"
 #include "core/check.h"
 
 namespace weft::simulation {

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "coordinator/queue.h"
+#include "coordinator/queue/queue.h"
 #include "proto/weft/v1/cluster.pb.h"
 #include "tests/simulation/checks.h"
 #include "tests/simulation/disk.h"

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "coordinator/queue_events.h"
+#include "coordinator/queue/events.h"
 #include "core/digest.h"
 #include "tests/simulation/fake_fabric.h"
 

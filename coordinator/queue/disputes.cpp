@@ -1,0 +1,254 @@
+#include <algorithm>
+#include <set>
+
+#include "coordinator/queue/queue.h"
+#include "core/check.h"
+
+// Two different results of one deterministic shard: an alarm. Further workers are asked until two
+// agree and are more than any others; those who said otherwise are blocked for that kind of task,
+// and what was computed from a wrong result is computed again. When nobody is left to be asked, the
+// result is forgotten and the jobs that use it fail: publishing a guess would be worse.
+
+namespace weft::coordinator {
+
+namespace {
+
+std::string in_words(StageName stage, std::uint64_t shard) {
+  return std::string(to_string(stage)) + " shard " + std::to_string(shard);
+}
+
+std::vector<std::string> names_of(const Dispute& dispute) {
+  std::set<std::string> names;
+  for (const Dispute::Opinion& opinion : dispute.opinions) {
+    names.insert(opinion.worker.empty() ? "(unknown)" : opinion.worker);
+  }
+  return {names.begin(), names.end()};
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) {
+    text += (text.empty() ? "" : ", ") + name;
+  }
+  return text;
+}
+
+}  // namespace
+
+bool Dispute::has_asked(const std::string& worker) const {
+  return std::any_of(opinions.begin(), opinions.end(),
+                     [&](const Opinion& opinion) { return opinion.worker == worker; });
+}
+
+void Queue::dispute(JobState& job, std::size_t index, std::uint64_t shard,
+                    const Dispute::Opinion& opinion, Time now, Actions& actions) {
+  const StageState& first = job.stages[index];
+  const core::Digest work = first.digests[shard];
+  const core::Digest recorded = first.results[shard];
+  const std::string& author = author_name(first.authors[shard]);
+  actions.mismatches.push_back(
+      {job.id, first.name, shard, author, recorded, opinion.worker, opinion.result, ""});
+  Dispute dispute;
+  dispute.stage = first.name;
+  dispute.opinions = {{author, recorded, 0}, opinion};
+  dispute.possible_at = now;
+  for (auto& [order, other] : jobs_) {
+    if (other.has_ended() || other.phase == JobPhase::kCommitting) {
+      continue;
+    }
+    for (StageState& stage : other.stages) {
+      for (std::uint64_t i = 0; stage.name == first.name && i < stage.shards.size(); ++i) {
+        if (stage.digests[i] == work && stage.shards[i] == ShardState::kDone) {
+          dispute.jobs.insert(order);
+          join_dispute(other, stage, i, dispute);
+        }
+      }
+    }
+    refresh(other, now);
+  }
+  if (dispute.jobs.empty()) {
+    // Its job is being committed: too late for a third opinion there, but others shall not use it.
+    actions.results_dropped.push_back({work, recorded});
+    return;
+  }
+  disputes_[work] = std::move(dispute);
+  actions.wake = true;
+}
+
+void Queue::join_dispute(JobState& job, StageState& stage, std::uint64_t shard,
+                         const Dispute& dispute) {
+  const auto waiting = stage.audits.find(stage.authors[shard]);
+  if (waiting != stage.audits.end()) {
+    waiting->second.remove(shard);
+    if (waiting->second.empty()) {
+      stage.audits.erase(waiting);
+    }
+  }
+  stage.auditing.remove(shard);
+  stage.disputed.insert(shard);
+  ++job.revision;
+  const bool is_known = std::any_of(job.troubles.begin(), job.troubles.end(), [&](const auto& t) {
+    return t.kind == Trouble::Kind::kMismatch && t.stage == stage.name && t.shard == shard;
+  });
+  if (!is_known) {
+    job.troubles.push_back({Trouble::Kind::kMismatch, stage.name, shard,
+                            in_words(stage.name, shard) + ": " + listed(names_of(dispute)) +
+                                " gave different results; others are asked",
+                            names_of(dispute), 0, ""});
+  }
+}
+
+// One more result of a disputed shard. Each name counts once.
+void Queue::hear(const core::Digest& work, const Dispute::Opinion& opinion, Time now,
+                 Actions& actions) {
+  Dispute& dispute = disputes_.at(work);
+  if (dispute.has_asked(opinion.worker)) {
+    return;
+  }
+  dispute.opinions.push_back(opinion);
+  std::map<core::Digest, std::set<std::string>> votes;
+  for (const Dispute::Opinion& said : dispute.opinions) {
+    votes[said.result].insert(said.worker);
+  }
+  std::size_t most = 0;
+  std::size_t next = 0;
+  core::Digest right;
+  for (const auto& [result, names] : votes) {
+    if (names.size() > most) {
+      next = most;
+      most = names.size();
+      right = result;
+    } else {
+      next = std::max(next, names.size());
+    }
+  }
+  if (most >= 2 && most > next) {
+    resolve(work, right, now, actions);
+  } else if (dispute.opinions.size() >= settings_.opinion_limit) {
+    give_up(work, "no two of the workers asked agree", now, actions);
+  } else {
+    actions.wake = true;
+  }
+}
+
+void Queue::resolve(const core::Digest& work, const core::Digest& right, Time now,
+                    Actions& actions) {
+  const Dispute dispute = std::move(disputes_.at(work));
+  disputes_.erase(work);
+  std::vector<Dispute::Opinion> honest;
+  std::vector<Dispute::Opinion> wrong;
+  for (const Dispute::Opinion& opinion : dispute.opinions) {
+    (opinion.result == right ? honest : wrong).push_back(opinion);
+  }
+  if (dispute.opinions.front().result != right) {
+    actions.results_dropped.push_back({work, dispute.opinions.front().result});
+    actions.results.push_back({work, right, honest[0].size_bytes, honest[0].worker});
+  }
+  actions.audits.push_back({work, honest[1].worker});
+  std::set<std::string> liars;
+  for (const Dispute::Opinion& opinion : wrong) {
+    liars.insert(opinion.worker);
+  }
+  for (const Dispute::Opinion& opinion : honest) {
+    liars.erase(opinion.worker);  // it once gave the right one: two machines of one name
+  }
+  liars.erase("");
+  for (const std::uint64_t order : dispute.jobs) {
+    for (Trouble& trouble : jobs_.at(order).troubles) {
+      const bool is_it = trouble.kind == Trouble::Kind::kMismatch && trouble.liar.empty() &&
+                         trouble.stage == dispute.stage && is_disputed(order, trouble, work);
+      if (is_it) {
+        trouble.liar = listed({liars.begin(), liars.end()});
+        trouble.workers = names_of(dispute);
+        trouble.message = in_words(trouble.stage, trouble.shard) + ": " +
+                          (liars.empty() ? "a worker" : trouble.liar) + " gave a wrong result, " +
+                          std::to_string(honest.size()) + " others agree on another one";
+        actions.mismatches.push_back({jobs_.at(order).id, dispute.stage, trouble.shard,
+                                      honest[0].worker, right, wrong[0].worker, wrong[0].result,
+                                      wrong[0].worker});
+      }
+    }
+  }
+  replace(work, dispute, honest[0], now, actions);
+  for (const std::string& liar : liars) {
+    block(liar, dispute.stage, true, now, actions);
+  }
+  for (const std::uint64_t order : dispute.jobs) {
+    settle(jobs_.at(order), now, actions);
+  }
+}
+
+bool Queue::is_disputed(std::uint64_t order, const Trouble& trouble,
+                        const core::Digest& work) const {
+  const std::vector<StageState>& stages = jobs_.at(order).stages;
+  return std::any_of(stages.begin(), stages.end(), [&](const StageState& stage) {
+    return stage.name == trouble.stage && stage.disputed.contains(trouble.shard) &&
+           stage.digests[trouble.shard] == work;
+  });
+}
+
+// Gives the jobs the right result. One that computed something from the wrong one begins again.
+void Queue::replace(const core::Digest& work, const Dispute& dispute, const Dispute::Opinion& right,
+                    Time now, Actions& actions) {
+  const bool was_wrong = dispute.opinions.front().result != right.result;
+  for (const std::uint64_t order : dispute.jobs) {
+    JobState& job = jobs_.at(order);
+    bool was_used = false;
+    for (StageState& stage : job.stages) {
+      const std::set<std::uint64_t> disputed = stage.disputed;
+      for (const std::uint64_t shard : disputed) {
+        if (stage.digests[shard] != work) {
+          continue;
+        }
+        stage.disputed.erase(shard);
+        ++job.audited_shards;
+        if (was_wrong) {
+          stage.results[shard] = right.result;
+          stage.authors[shard] = author_of(right.worker);
+          was_used = was_used || stage.is_done();
+        }
+      }
+    }
+    ++job.revision;
+    if (was_used) {
+      begin_again(job, now, actions);
+    }
+    refresh(job, now);
+  }
+}
+
+// Nobody can tell which result is right: none is kept.
+void Queue::give_up(const core::Digest& work, const std::string& why, Time now, Actions& actions) {
+  const auto entry = disputes_.find(work);
+  if (entry == disputes_.end()) {
+    return;
+  }
+  const Dispute dispute = std::move(entry->second);
+  disputes_.erase(entry);
+  actions.results_dropped.push_back({work, dispute.opinions.front().result});
+  for (const std::uint64_t order : dispute.jobs) {
+    JobState& job = jobs_.at(order);
+    if (!job.has_ended()) {
+      job.error = "a " + std::string(to_string(dispute.stage)) + " shard has different results (" +
+                  listed(names_of(dispute)) + "), and " + why +
+                  "; let another worker join and retry the job";
+      end_job(job, JobPhase::kFailed, now, actions);
+    }
+  }
+}
+
+// The job has ended: a result that nobody looks into any more is not kept for others.
+void Queue::leave_disputes(const JobState& job, Actions& actions) {
+  const std::uint64_t order = order_of_job_.at(job.id);
+  for (auto it = disputes_.begin(); it != disputes_.end();) {
+    it->second.jobs.erase(order);
+    if (it->second.jobs.empty()) {
+      actions.results_dropped.push_back({it->first, it->second.opinions.front().result});
+      it = disputes_.erase(it);
+    } else {
+      ++it;
+    }
+  }
+}
+
+}  // namespace weft::coordinator
