@@ -1,12 +1,12 @@
 #include "cli/fabric_reference.h"
 
-#include <cstdlib>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "cli/client.h"
 #include "client/fabric_cache.h"
+#include "core/cache_folder.h"
 #include "core/error.h"
 #include "proto/names.h"
 
@@ -16,20 +16,6 @@ namespace {
 
 constexpr std::size_t kDigitsLimit = 18;
 constexpr std::uint64_t kCacheLimitBytes = std::uint64_t{16} << 30;
-
-// $XDG_CACHE_HOME/weft, else ~/.cache/weft; empty when neither is set.
-std::filesystem::path cache_folder() {
-  // No other thread changes the environment: weft never does.
-  const char* cache = std::getenv("XDG_CACHE_HOME");  // NOLINT(concurrency-mt-unsafe)
-  if (cache != nullptr && *cache == '/') {
-    return std::filesystem::path(cache) / "weft";
-  }
-  const char* home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe)
-  if (home == nullptr || *home == '\0') {
-    return {};
-  }
-  return std::filesystem::path(home) / ".cache" / "weft";
-}
 
 }  // namespace
 
@@ -63,7 +49,7 @@ std::string mistake_in_reference(const std::string& text) {
 }
 
 std::filesystem::path fabric_cache_folder() {
-  const std::filesystem::path folder = cache_folder();
+  const std::filesystem::path folder = core::cache_folder();
   if (folder.empty()) {
     throw core::Error(core::Code::kFailedPrecondition,
                       "there is no folder for fetched fabrics: neither XDG_CACHE_HOME nor HOME is "
@@ -73,7 +59,7 @@ std::filesystem::path fabric_cache_folder() {
 }
 
 std::filesystem::path environment_cache_folder() {
-  const std::filesystem::path folder = cache_folder();
+  const std::filesystem::path folder = core::cache_folder();
   return folder.empty() ? folder : folder / "environments";
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/version.h"
 #include "render/scene_description.h"
 
 namespace weft::cli {
@@ -51,7 +52,7 @@ std::map<std::string, std::string> recipe_of(const v1::Scene& still,
     identities[reference] = {{"name", fabric.name}, {"content_digest", fabric.content_digest}};
   }
   constexpr auto replace = nlohmann::json::error_handler_t::replace;  // a path may be no UTF-8
-  return {{"weft.software", "weft 0.1.0"},
+  return {{"weft.software", std::string("weft ") + core::version()},
           {"weft.integrator", v1::Integrator_Name(still.integration().integrator())},
           {"weft.samples_per_pixel", std::to_string(still.picture().samples_per_pixel())},
           {"weft.seed", std::to_string(still.integration().seed())},

@@ -4,12 +4,25 @@
 
 namespace weft::core {
 
-Interrupt::Interrupt() {
-  sigemptyset(&signals_);
-  sigaddset(&signals_, SIGINT);
-  sigaddset(&signals_, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals_, &before_);
+namespace {
+
+sigset_t interrupts() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  return signals;
 }
+
+}  // namespace
+
+sigset_t block_interrupts() {
+  const sigset_t signals = interrupts();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+Interrupt::Interrupt() : signals_(interrupts()) { pthread_sigmask(SIG_BLOCK, &signals_, &before_); }
 
 Interrupt::~Interrupt() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
 

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/exit_code.h"
 #include "core/error.h"
+#include "core/exit_code.h"
 #include "core/file.h"
 #include "storage/fabric_database.h"
 #include "tests/storage_test_database.h"
@@ -44,7 +44,7 @@ class InspectTest : public testing::Test {
     try {
       app.parse(arguments);
     } catch (const CLI::ParseError&) {
-      code = kExitWrongUse;
+      code = core::kExitWrongUse;
     } catch (const core::Error& error) {
       error_ = error.what();
       code = exit_code(error.code());
@@ -97,22 +97,22 @@ TEST_F(InspectTest, VerifyPassesAWholeFile) {
 
 TEST_F(InspectTest, DamageIsReportedAndFails) {
   damage();
-  EXPECT_EQ(run("verify " + path_.string()), kExitFailed);
+  EXPECT_EQ(run("verify " + path_.string()), core::kExitFailed);
   EXPECT_THAT(error_, HasSubstr("small.h5 is damaged"));
   EXPECT_EQ(output_, "");
-  EXPECT_EQ(run("verify --json " + path_.string()), kExitFailed);
+  EXPECT_EQ(run("verify --json " + path_.string()), core::kExitFailed);
   EXPECT_EQ(nlohmann::json::parse(output_)["valid"], false);
-  EXPECT_EQ(run("inspect --json " + path_.string()), kExitFailed);
+  EXPECT_EQ(run("inspect --json " + path_.string()), core::kExitFailed);
   EXPECT_THAT(error_, HasSubstr("small.h5 is damaged"));
 }
 
 TEST_F(InspectTest, MissingFileHasItsOwnExitCode) {
   for (const char* command : {"verify ", "inspect ", "verify --json ", "inspect --json "}) {
-    EXPECT_EQ(run(command + (folder_ / "absent.h5").string()), kExitNotFound);
+    EXPECT_EQ(run(command + (folder_ / "absent.h5").string()), core::kExitNotFound);
     EXPECT_THAT(error_, HasSubstr("absent.h5"));
     EXPECT_EQ(output_, "");
   }
-  EXPECT_EQ(run("verify"), kExitWrongUse);
+  EXPECT_EQ(run("verify"), core::kExitWrongUse);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/exit_code.h"
+#include "core/exit_code.h"
 #include "core/file.h"
 #include "tests/cli_programs.h"
 
@@ -36,7 +36,7 @@ TEST(ListDevices, SaysWhatToInstallWhereThereIsNoDriver) {
   while (const auto line = process.read_line(60)) {
     out += *line;
   }
-  EXPECT_EQ(process.wait(10), kExitFailed);
+  EXPECT_EQ(process.wait(10), core::kExitFailed);
   EXPECT_THAT(out, IsEmpty());
   EXPECT_THAT(core::read_file(log), HasSubstr("there is no Vulkan driver; install"));
   EXPECT_THAT(core::read_file(log), HasSubstr("mesa-vulkan-drivers"));

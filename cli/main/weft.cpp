@@ -1,20 +1,17 @@
 #include <cstdio>
-#include <exception>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.h"
-#include "cli/exit_code.h"
-#include "core/error.h"
+#include "core/program.h"
 #include "security/grpc_log.h"
 
 int main(int argc, char** argv) {
   namespace cli = weft::cli;
   namespace core = weft::core;
   CLI::App app{"weft shows cloth as it is: from a weaving draft to a picture of every fibre."};
-  app.name("weft");
+  core::set_program_name(app, "weft");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "weft 0.1.0");
   // One line per command, in the order of commands.h.
   cli::add_new(app);
   cli::add_import(app);
@@ -52,19 +49,8 @@ int main(int argc, char** argv) {
   const auto is_named = [argv](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
     std::fprintf(stderr, "weft: there is no command '%s'; weft --help lists them\n", argv[1]);
-    return cli::kExitWrongUse;
+    return core::kExitWrongUse;
   }
   weft::security::silence_grpc();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : cli::kExitWrongUse;
-  } catch (const core::Error& error) {
-    std::fprintf(stderr, "weft: %s\n", error.what());
-    return cli::exit_code(error.code());
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "weft: internal error: %s\n", error.what());
-    return cli::kExitFailed;
-  }
-  return 0;
+  return core::run_program(app, argc, argv, [] { return 0; });
 }

@@ -1,17 +1,17 @@
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
-#include <exception>
+#include <filesystem>
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "core/cache_folder.h"
 #include "core/clock.h"
-#include "core/error.h"
+#include "core/interrupt.h"
+#include "core/program.h"
 #include "proto/address.h"
 #include "render/node/render_node.h"
 #include "security/endpoint_options.h"
@@ -34,26 +34,6 @@ struct Options {
 
 constexpr double kGib = 1024.0 * 1024 * 1024;
 
-// Blocks SIGTERM and SIGINT in this thread and all that it starts; they are waited for.
-sigset_t block_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  return signals;
-}
-
-std::string default_cache() {
-  // No other thread changes the environment: weft never does.
-  const char* cache = std::getenv("XDG_CACHE_HOME");  // NOLINT(concurrency-mt-unsafe)
-  if (cache != nullptr && *cache == '/') {
-    return std::string(cache) + "/weft";
-  }
-  const char* home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe)
-  return home != nullptr && *home != '\0' ? std::string(home) + "/.cache/weft" : "weft-cache";
-}
-
 // Three quarters of the machine's.
 double default_memory_gib() {
   const auto pages = static_cast<double>(sysconf(_SC_PHYS_PAGES));
@@ -61,7 +41,9 @@ double default_memory_gib() {
 }
 
 int serve(Options options) {
-  const sigset_t signals = block_signals();
+  core::start_log(options.log_level);
+  security::log_what_grpc_says();
+  const sigset_t signals = core::block_interrupts();
   options.node.cache_limit_bytes = static_cast<std::uint64_t>(options.cache_gib * kGib);
   options.node.memory_limit_bytes = static_cast<std::uint64_t>(options.memory_gib * kGib);
   options.node.coordinator.tls_folder = options.listen.tls_folder;
@@ -115,9 +97,7 @@ void add_options(CLI::App& app, Options& options) {
                  "seconds that orders get to finish after SIGTERM")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
-  app.add_option("--log-level", options.log_level, "what is logged to stderr")
-      ->check(CLI::IsMember({"debug", "info", "warn", "error"}))
-      ->capture_default_str();
+  core::add_log_option(app, options.log_level);
 }
 
 }  // namespace
@@ -125,39 +105,13 @@ void add_options(CLI::App& app, Options& options) {
 int main(int argc, char** argv) {
   Options options;
   options.node.coordinator = "127.0.0.1:7411";
-  options.node.cache = default_cache();
+  const std::filesystem::path cache = core::cache_folder();
+  options.node.cache = cache.empty() ? "weft-cache" : cache.string();
   options.memory_gib = default_memory_gib();
   CLI::App app{
       "weft-render draws scenes for 'weft render --node' and others: it fetches the fabrics that "
       "they name from a coordinator and keeps them between pictures."};
-  app.name("weft-render");
+  core::set_program_name(app, "weft-render");
   add_options(app, options);
-  app.set_version_flag("--version", "weft-render 0.1.0");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  spdlog::set_default_logger(spdlog::stderr_color_mt("render"));
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
-  spdlog::set_level(spdlog::level::from_str(options.log_level));
-  security::log_what_grpc_says();
-  try {
-    return serve(options);
-  } catch (const core::Error& error) {
-    std::fprintf(stderr, "weft-render: %s\n", error.what());
-    switch (error.code()) {
-      case core::Code::kPermissionDenied:
-        return 4;
-      case core::Code::kUnavailable:
-        return 5;
-      case core::Code::kNotFound:
-        return 3;
-      default:
-        return 1;
-    }
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "weft-render: internal error: %s\n", error.what());
-    return 1;
-  }
+  return core::run_program(app, argc, argv, [&] { return serve(options); });
 }

@@ -10,6 +10,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/version.h"
 #include "proto/status.h"
 #include "render/draw_pictures.h"
 #include "render/make_integrator.h"
@@ -223,7 +224,7 @@ grpc::Status RenderService::GetNode(grpc::ServerContext* context,
   } catch (const core::Error& error) {
     return v1::to_status(error);
   }
-  response->set_software("weft 0.1.0");
+  response->set_software(std::string("weft ") + core::version());
   response->set_draining(queue_.closed());
   response->set_orders(queue_.size());
   response->set_orders_limit(queue_.limit());

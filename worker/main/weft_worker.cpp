@@ -1,19 +1,18 @@
 #include <algorithm>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
-#include <exception>
 #include <filesystem>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "core/error.h"
+#include "core/cache_folder.h"
 #include "core/interrupt.h"
+#include "core/program.h"
 #include "proto/address.h"
 #include "proto/limits.h"
 #include "proto/names.h"
@@ -42,15 +41,9 @@ std::string host_name() {
 }
 
 std::string default_scratch() {
-  // No other thread runs yet.
-  const char* cache = std::getenv("XDG_CACHE_HOME");  // NOLINT(concurrency-mt-unsafe)
-  if (cache != nullptr && *cache == '/') {
-    return std::string(cache) + "/weft/worker";
-  }
-  const char* home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe)
-  return home != nullptr && *home != '\0'
-             ? std::string(home) + "/.cache/weft/worker"
-             : (std::filesystem::temp_directory_path() / "weft-worker").string();
+  const std::filesystem::path cache = weft::core::cache_folder();
+  return (cache.empty() ? std::filesystem::temp_directory_path() / "weft-worker" : cache / "worker")
+      .string();
 }
 
 std::string mistake_in_label(const std::string& label) {
@@ -109,25 +102,21 @@ void declare(CLI::App& app, Flags& flags) {
                  "never")
       ->check(CLI::Range(0.0, 1e8))
       ->capture_default_str();
-  app.add_option("--log-level", flags.log_level, "error, warn, info or debug")
-      ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
-      ->capture_default_str();
+  weft::core::add_log_option(app, flags.log_level);
   app.footer(
       "Computes shards for a coordinator until it is told to end. SIGTERM or Ctrl-C: begins "
       "nothing\nmore, reports what is done and ends within ten seconds; a second one ends it at "
       "once. While the\ncoordinator is away the worker goes on with what it has and tries again.\n"
       "Results that the coordinator has not acknowledged stay in the scratch folder, and are\n"
       "reported by the next worker that is started on it.\n"
-      "Exits with 0 when it was told to end, 1 when the coordinator refuses it or every thread\n"
+      "Exits with 0 when it was told to end, 4 when the coordinator refuses it, 1 when every "
+      "thread\n"
       "hangs.\n"
       "Example: weft-worker --coordinator 127.0.0.1:7411 --threads 4");
 }
 
 void work(Flags flags) {
-  const auto log = spdlog::stderr_logger_mt("weft-worker");
-  log->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
-  spdlog::set_default_logger(log);
-  spdlog::set_level(spdlog::level::from_str(flags.log_level));
+  weft::core::start_log(flags.log_level);
   weft::security::log_what_grpc_says();
   // Before gRPC, and before any thread is started.
   ::setenv(kConnectionLook, kConnectionLookMs, 0);  // NOLINT(concurrency-mt-unsafe)
@@ -154,21 +143,11 @@ void work(Flags flags) {
 
 int main(int argc, char** argv) {
   CLI::App app{"weft-worker computes shards of fabrics for a coordinator."};
-  app.name("weft-worker");
-  app.set_version_flag("--version", "weft-worker 0.1.0");
+  weft::core::set_program_name(app, "weft-worker");
   Flags flags;
-  try {
-    declare(app, flags);
-    app.parse(argc, argv);
+  declare(app, flags);
+  return weft::core::run_program(app, argc, argv, [&] {
     work(std::move(flags));
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const weft::core::Error& error) {
-    std::fprintf(stderr, "weft-worker: %s\n", error.what());
-    return 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "weft-worker: internal error: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+    return 0;
+  });
 }

@@ -2,7 +2,7 @@
 
 #include "core/error.h"
 
-namespace weft::cli {
+namespace weft::core {
 
 inline constexpr int kExitFailed = 1;    // the work failed, or an input is wrong
 inline constexpr int kExitWrongUse = 2;  // the command line is wrong
@@ -10,18 +10,18 @@ inline constexpr int kExitNotFound = 3;
 inline constexpr int kExitRefused = 4;      // not allowed, or over a limit
 inline constexpr int kExitUnavailable = 5;  // the coordinator or a file system does not answer
 
-[[nodiscard]] constexpr int exit_code(core::Code code) {
+[[nodiscard]] constexpr int exit_code(Code code) {
   switch (code) {
-    case core::Code::kNotFound:
+    case Code::kNotFound:
       return kExitNotFound;
-    case core::Code::kPermissionDenied:
-    case core::Code::kResourceExhausted:
+    case Code::kPermissionDenied:
+    case Code::kResourceExhausted:
       return kExitRefused;
-    case core::Code::kUnavailable:
+    case Code::kUnavailable:
       return kExitUnavailable;
     default:
       return kExitFailed;
   }
 }
 
-}  // namespace weft::cli
+}  // namespace weft::core

@@ -1,0 +1,7 @@
+#include "core/version.h"
+
+namespace weft::core {
+
+const char* version() { return WEFT_VERSION; }
+
+}  // namespace weft::core
