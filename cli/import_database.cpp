@@ -8,6 +8,7 @@
 #include "cli/fabric_reference.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 #include "core/input_file.h"
 #include "storage/fabric_database.h"
 
@@ -57,13 +58,7 @@ class Copy {
 
 std::filesystem::path folder_in_cache() {
   std::filesystem::path folder = fabric_cache_folder();
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable, "cannot make the folder " + folder.string() + ": " +
-                                                    failure.message() +
-                                                    "; name a file with -o instead");
-  }
+  core::make_folder(folder, "name a file with -o instead");
   return folder;
 }
 

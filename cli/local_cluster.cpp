@@ -17,6 +17,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 
 namespace weft::cli {
 
@@ -58,13 +59,7 @@ LocalCluster::LocalCluster(LocalClusterOptions options) : options_(std::move(opt
   if (options_.threads == 0) {
     options_.threads = std::max(1U, std::thread::hardware_concurrency() / options_.workers);
   }
-  std::error_code failure;
-  std::filesystem::create_directories(options_.state / "logs", failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot make the folder " + options_.state.string() + ": " +
-                          failure.message() + "; name another with --state");
-  }
+  core::make_folder(options_.state / "logs", "name another with --state");
 }
 
 LocalCluster::~LocalCluster() { stop(); }

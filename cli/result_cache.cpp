@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 
 namespace weft::cli {
 
@@ -18,13 +19,7 @@ constexpr std::size_t kHexLength = 64;
 constexpr std::size_t kLineLength = 2 * kHexLength + 2;  // shard, space, result, newline
 
 std::filesystem::path made(const std::filesystem::path& folder) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable, "cannot make the folder " + folder.string() + ": " +
-                                                    failure.message() +
-                                                    "; name one that can be written with --cache");
-  }
+  core::make_folder(folder, "name one that can be written with --cache");
   return folder;
 }
 

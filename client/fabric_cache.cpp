@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 #include "storage/pieces.h"
 
 namespace weft::client {
@@ -78,13 +79,7 @@ std::filesystem::path FabricCache::fetch(Coordinator& coordinator, const v1::Ver
                           " bytes, and the cache of fabrics holds " + std::to_string(limit_bytes_) +
                           "; give the cache a larger limit");
   }
-  std::error_code failure;
-  std::filesystem::create_directories(folder_, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable, "cannot make the folder " + folder_.string() +
-                                                    ": " + failure.message() +
-                                                    "; name one that can be written");
-  }
+  core::make_folder(folder_);
   std::filesystem::path path = folder_ / (version_digest(version).hex() + ".h5");
   const FetchOutcome outcome = fetch_version(coordinator, version, path, report, pieces());
   if (!outcome.pieces.empty()) {

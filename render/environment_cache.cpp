@@ -11,6 +11,7 @@
 #include "core/digest.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 
 namespace weft::render {
 namespace {
@@ -91,13 +92,7 @@ EnvironmentFit cached_environment_fit(const EnvironmentLight& light,
     unturned = *std::move(kept);
   } else {
     unturned = fit_unturned(light, settings);
-    std::error_code failure;
-    std::filesystem::create_directories(folder, failure);
-    if (failure) {
-      throw core::Error(core::Code::kUnavailable,
-                        "cannot make the folder " + folder.string() + ": " + failure.message() +
-                            "; set XDG_CACHE_HOME to one that can be written");
-    }
+    core::make_folder(folder, "set XDG_CACHE_HOME to one that can be written");
     core::write_file_atomically(path, text_of(unturned));
   }
   return turned(std::move(unturned), light.environment->turn());

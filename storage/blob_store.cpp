@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 
 namespace weft::storage {
 
@@ -17,15 +18,6 @@ namespace {
 constexpr const char* kTrash = "trash";
 constexpr std::int64_t kMsPerSecond = 1000;
 constexpr std::int64_t kNsPerMs = 1'000'000;
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot create the folder " + folder.string() + ": " + failure.message());
-  }
-}
 
 // By the clock of the file system, which is that of core::system_clock.
 bool touch(const std::filesystem::path& path) {
@@ -80,7 +72,7 @@ std::filesystem::path path_in(const std::filesystem::path& folder, const core::D
 }  // namespace
 
 BlobStore::BlobStore(std::filesystem::path folder) : folder_(std::move(folder)) {
-  make_folder(folder_);
+  core::make_folder(folder_);
 }
 
 std::filesystem::path BlobStore::path_of(const core::Digest& digest) const {
@@ -99,7 +91,7 @@ core::Digest BlobStore::put(std::string_view data) {
     return digest;
   }
   const std::filesystem::path path = path_of(digest);
-  make_folder(path.parent_path());
+  core::make_folder(path.parent_path());
   core::write_file_atomically(path, data);
   return digest;
 }
@@ -114,7 +106,7 @@ bool BlobStore::put_checked(const core::Digest& digest, std::string_view data) {
 
 void BlobStore::adopt(const std::filesystem::path& file, const core::Digest& digest) {
   const std::filesystem::path path = path_of(digest);
-  make_folder(path.parent_path());
+  core::make_folder(path.parent_path());
   touch(file);
   core::publish_file(file, path);
 }
@@ -159,7 +151,7 @@ bool BlobStore::restore(const core::Digest& digest) const {
     return false;
   }
   const std::filesystem::path path = path_of(digest);
-  make_folder(path.parent_path());
+  core::make_folder(path.parent_path());
   std::error_code failure;
   std::filesystem::rename(kept, path, failure);
   return !failure;
@@ -177,7 +169,7 @@ void BlobStore::visit_trash(const Visit& visit) const { visit_folder(folder_ / k
 bool BlobStore::trash(const core::Digest& digest, std::int64_t before_ms) const {
   const std::filesystem::path path = path_of(digest);
   const std::filesystem::path kept = trash_path_of(digest);
-  make_folder(kept.parent_path());
+  core::make_folder(kept.parent_path());
   const std::lock_guard lock(mutex_);
   const std::optional<FileFacts> facts = facts_of(path);
   // Touched first: the time in the trash counts from now even if the process dies in between.

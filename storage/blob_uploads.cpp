@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "core/folder.h"
 
 namespace weft::storage {
 
@@ -29,12 +30,7 @@ struct Part {
 
 BlobUploads::BlobUploads(BlobStore& store, UploadLimits limits)
     : store_(store), folder_(store.folder() / "uploads"), limits_(limits) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder_, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot create the folder " + folder_.string() + ": " + failure.message());
-  }
+  core::make_folder(folder_);
 }
 
 std::filesystem::path BlobUploads::path_of(const core::Digest& digest) const {

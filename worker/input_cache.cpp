@@ -8,19 +8,15 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 #include "proto/limits.h"
 
 namespace weft::worker {
 
 InputCache::InputCache(std::filesystem::path folder, std::uint64_t limit_bytes, BlobClient& client)
     : folder_(std::move(folder)), limit_bytes_(limit_bytes), client_(client) {
+  core::make_folder(folder_, "name another with --scratch");
   std::error_code failure;
-  std::filesystem::create_directories(folder_, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable, "cannot make the folder " + folder_.string() +
-                                                    ": " + failure.message() +
-                                                    "; name another with --scratch");
-  }
   for (const auto& item : std::filesystem::directory_iterator(folder_, failure)) {
     const auto digest = core::Digest::from_hex(item.path().filename().string());
     std::error_code gone;

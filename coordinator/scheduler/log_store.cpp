@@ -13,6 +13,7 @@
 #include "coordinator/scheduler/messages.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/folder.h"
 
 namespace weft::coordinator {
 
@@ -65,12 +66,7 @@ std::size_t line_before(std::string_view text, std::size_t at) {
 
 LogStore::LogStore(fs::path folder, LogLimits limits)
     : folder_(std::move(folder)), limits_(limits) {
-  std::error_code failure;
-  fs::create_directories(folder_, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot make the folder " + folder_.string() + ": " + failure.message());
-  }
+  core::make_folder(folder_);
   load();
 }
 

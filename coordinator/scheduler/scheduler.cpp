@@ -8,6 +8,7 @@
 #include "coordinator/journal/records_of.h"
 #include "core/check.h"
 #include "core/error.h"
+#include "core/folder.h"
 #include "fabric/description.h"
 #include "proto/arrays.h"
 #include "proto/limits.h"
@@ -43,7 +44,7 @@ std::string job_id_of(const std::string& request_id) {
 Scheduler::Scheduler(SchedulerOptions options, const core::Clock& clock)
     : options_(std::move(options)),
       clock_(clock),
-      journal_((std::filesystem::create_directories(options_.state_folder),
+      journal_((core::make_folder(options_.state_folder, "name another with --state"),
                 options_.state_folder / "journal.db")),
       blobs_(options_.state_folder / "blobs"),
       catalogue_(journal_, options_.state_folder),
@@ -51,7 +52,7 @@ Scheduler::Scheduler(SchedulerOptions options, const core::Clock& clock)
       queue_(options_.queue, journal_.epoch()) {
   // What an earlier process was writing when it died is of no use.
   std::filesystem::remove_all(options_.state_folder / "committing");
-  std::filesystem::create_directories(options_.state_folder / "committing");
+  core::make_folder(options_.state_folder / "committing");
   catalogue_.set_remake([this](const VersionRecord& version) { return remake(version); });
   load();
   planner_ = std::thread([this] { work_through(to_plan_); });

@@ -6,6 +6,7 @@
 
 #include "coordinator/versions/catalogue.h"
 #include "core/error.h"
+#include "core/folder.h"
 #include "proto/names.h"
 #include "storage/user_block.h"
 
@@ -20,15 +21,6 @@ constexpr std::size_t kAssembledLimit = 4;
 
 std::string text_of(const VersionRecord& version) {
   return version.fabric + "@" + std::to_string(version.number);
-}
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) {
-    throw core::Error(core::Code::kUnavailable,
-                      "cannot create the folder " + folder.string() + ": " + failure.message());
-  }
 }
 
 // Databases name the digest of what follows their user block.
@@ -55,10 +47,10 @@ Catalogue::Catalogue(Journal& journal, const std::filesystem::path& state_folder
       whole_files_(state_folder / "versions"),
       assembled_(state_folder / "assembled"),
       pieces_(state_folder / "pieces") {
-  make_folder(whole_files_);
+  core::make_folder(whole_files_);
   std::error_code ignored;  // what stays is found again
   std::filesystem::remove_all(assembled_, ignored);
-  make_folder(assembled_);
+  core::make_folder(assembled_);
 }
 
 // Cuts a file and stores what is not there; durable on return.
