@@ -88,7 +88,7 @@ TEST_F(BlobStoreTest, FolderThatCannotBeMadeIsAnError) {
     FAIL() << "no error";
   } catch (const core::Error& error) {
     EXPECT_EQ(error.code(), core::Code::kUnavailable);
-    EXPECT_NE(std::string(error.what()).find("cannot create the folder"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("cannot make the folder"), std::string::npos);
   }
 }
 
