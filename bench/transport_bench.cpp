@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -126,12 +127,17 @@ std::vector<std::vector<std::uint8_t>> images(std::uint64_t count) {
 
 void signed_distance(benchmark::State& state) {
   const auto some = images(64);
+  const float limit =
+      state.range(0) == 0 ? std::numbers::pi_v<float> : 1e-3f * static_cast<float>(state.range(0));
+  const transport::DistanceTransform transform(kResolution, limit);
+  std::vector<float> distances(std::size_t{kResolution} * kResolution);
   std::size_t i = 0;
   for (auto unused : state) {
-    benchmark::DoNotOptimize(transport::signed_distance(some[i++ % some.size()], kResolution));
+    transform.measure(some[i++ % some.size()], distances);
+    benchmark::DoNotOptimize(distances.data());
   }
 }
-BENCHMARK(signed_distance)->Unit(benchmark::kMicrosecond);
+BENCHMARK(signed_distance)->ArgName("limit_mrad")->Arg(0)->Arg(400)->Unit(benchmark::kMicrosecond);
 
 void gaussian_weights(benchmark::State& state) {
   const auto some = images(64);

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -58,6 +59,39 @@ TEST(TransportSignedDistance, EqualsBruteForce) {
       }
       ASSERT_NEAR(distances[p], is_visible(bits, p) ? nearest : -nearest, 5e-6)
           << caps << " caps, pixel " << p;
+    }
+  }
+}
+
+TEST(TransportSignedDistance, Limit_ChangesNothingNearer) {
+  constexpr std::uint32_t kResolution = 72;  // not a multiple of sixteen
+  constexpr float kLimit = 0.3f;
+  const auto bits = random_image(kResolution, 6, 11);
+  const auto exact = signed_distance(bits, kResolution);
+  std::vector<float> limited(exact.size());
+  DistanceTransform(kResolution, kLimit).measure(bits, limited);
+  std::size_t further = 0;
+  for (std::size_t p = 0; p < exact.size(); ++p) {
+    if (std::abs(exact[p]) < kLimit - 1e-6f) {
+      ASSERT_EQ(limited[p], exact[p]) << p;
+    } else {
+      ASSERT_NEAR(limited[p], std::copysign(kLimit, exact[p]), 1e-6f) << p;
+      ++further;
+    }
+  }
+  EXPECT_GT(further, 100u);
+  EXPECT_LT(further, exact.size() - 100);
+}
+
+TEST(TransportSignedDistance, WideAndPortablePaths_GiveTheSameBits) {
+  for (const std::uint32_t resolution : {8u, 40u, 128u}) {
+    for (const int caps : {1, 4, 20}) {
+      const auto bits = random_image(resolution, caps, 17);
+      const auto chosen = signed_distance(bits, resolution);
+      setenv("WEFT_PORTABLE", "1", 1);
+      const auto portable = signed_distance(bits, resolution);
+      unsetenv("WEFT_PORTABLE");
+      EXPECT_EQ(chosen, portable) << resolution << ", " << caps << " caps";
     }
   }
 }
