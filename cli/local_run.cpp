@@ -16,6 +16,7 @@
 #include "coordinator/versions/commit.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/resource_use.h"
 #include "worker/baker.h"
 
 namespace weft::cli {
@@ -36,6 +37,7 @@ struct RunningStage {
   std::uint64_t cached = 0;
   core::Stopwatch since_start;
   double seconds = 0;  // of a finished stage
+  double cpu_seconds = 0;
 
   [[nodiscard]] bool is_finished() const { return done == plan.shard_count; }
 };
@@ -51,6 +53,7 @@ class LocalRun {
   [[nodiscard]] std::vector<coordinator::StageResults> results() const;
   [[nodiscard]] std::vector<StageProgress> progress() const;
   [[nodiscard]] std::string read(const core::Digest& digest) const { return cache_.read(digest); }
+  [[nodiscard]] double idle_seconds() const { return idle_seconds_; }  // after run()
 
  private:
   struct Claim {
@@ -78,6 +81,7 @@ class LocalRun {
   std::vector<std::unique_ptr<RunningStage>> stages_;  // in the order they were planned
   std::size_t finished_count_ = 0;
   bool is_over_ = false;  // nothing more is to be begun
+  double idle_seconds_ = 0;
   std::exception_ptr failure_;
   std::atomic<bool> should_stop_{false};
 };
@@ -95,6 +99,7 @@ void LocalRun::throw_if_stopped() const {
 
 std::unique_ptr<RunningStage> LocalRun::start(coordinator::Stage plan) const {
   auto stage = std::make_unique<RunningStage>();
+  const double cpu_before = core::thread_cpu_seconds();
   stage->names.reserve(plan.shard_count);
   stage->results.resize(plan.shard_count);
   for (std::uint64_t shard = 0; shard < plan.shard_count; ++shard) {
@@ -116,6 +121,7 @@ std::unique_ptr<RunningStage> LocalRun::start(coordinator::Stage plan) const {
     stage->baker = worker::make_baker(std::move(context));
   }
   stage->plan = std::move(plan);
+  stage->cpu_seconds = core::thread_cpu_seconds() - cpu_before;
   return stage;
 }
 
@@ -164,6 +170,7 @@ std::vector<StageProgress> LocalRun::progress() const {
         progress.back().cached = stage->cached;
         progress.back().seconds =
             stage->is_finished() ? stage->seconds : stage->since_start.seconds();
+        progress.back().cpu_seconds = stage->cpu_seconds;
       }
     }
   }
@@ -178,13 +185,16 @@ std::optional<LocalRun::Claim> LocalRun::claim() {
         return Claim{stage.get(), stage->todo[stage->next++]};
       }
     }
+    const core::Stopwatch since_idle;
     changed_.wait(lock);
+    idle_seconds_ += since_idle.seconds();
   }
   return std::nullopt;
 }
 
 void LocalRun::bake(const Claim& claim) {
   RunningStage& stage = *claim.stage;
+  const double cpu_before = core::thread_cpu_seconds();
   const std::string shard_input = stage.plan.shard_inputs.empty()
                                       ? std::string()
                                       : cache_.read(stage.plan.shard_inputs[claim.shard]);
@@ -194,6 +204,7 @@ void LocalRun::bake(const Claim& claim) {
   std::unique_ptr<worker::Baker> spent;  // released outside the lock: a scene is large
   const std::lock_guard lock(mutex_);
   stage.results[claim.shard] = digest;
+  stage.cpu_seconds += core::thread_cpu_seconds() - cpu_before;
   ++stage.done;
   if (stage.is_finished()) {
     stage.seconds = stage.since_start.seconds();
@@ -275,8 +286,9 @@ LocalRunResult run_locally(const v1::FabricDescription& description, unsigned th
   run.run(threads);
   hooks.report(run.progress());
   const auto reader = [&](const core::Digest& digest) { return run.read(digest); };
+  const core::Stopwatch since_merge;
   const core::Digest digest = coordinator::commit(description, run.results(), reader, output);
-  return {digest, run.progress()};
+  return {digest, run.progress(), since_merge.seconds(), run.idle_seconds()};
 }
 
 }  // namespace weft::cli

@@ -21,6 +21,8 @@ struct LocalRunHooks {
 struct LocalRunResult {
   core::Digest content_digest;
   std::vector<StageProgress> stages;
+  double merge_seconds = 0;  // folding the results into the database
+  double idle_seconds = 0;   // thread time in which a thread had no shard, before the merge
 };
 
 // The whole precomputation of a canonical description in this process: what the cluster's planner

@@ -17,6 +17,7 @@ struct StageProgress {
   std::uint64_t total = 0;                    // shards in all
   std::uint64_t cached = 0;                   // of `done`: taken from the cache, not computed
   double seconds = 0;                         // since the stage began; stops when it is finished
+  double cpu_seconds = 0;                     // of a run in this process: what it cost all threads
   std::optional<double> shards_per_second{};  // where it was measured; else done over seconds
 };
 

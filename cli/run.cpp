@@ -20,6 +20,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/interrupt.h"
+#include "core/resource_use.h"
 #include "fabric/description.h"
 
 namespace weft::cli {
@@ -47,7 +48,8 @@ nlohmann::json to_json(const StageProgress& stage) {
   return {{"name", stage.name},
           {"shards", stage.total},
           {"cached", stage.cached},
-          {"seconds", stage.seconds}};
+          {"seconds", stage.seconds},
+          {"cpu_seconds", stage.cpu_seconds}};
 }
 
 void print_result(const RunOptions& options, const v1::FabricDescription& description,
@@ -67,6 +69,10 @@ void print_result(const RunOptions& options, const v1::FabricDescription& descri
                             {"content_digest", result.content_digest.hex()},
                             {"size_bytes", size_bytes},
                             {"seconds", seconds},
+                            {"merge_seconds", result.merge_seconds},
+                            {"idle_thread_seconds", result.idle_seconds},
+                            {"cpu_seconds", core::process_cpu_seconds()},
+                            {"peak_memory_bytes", core::process_peak_bytes()},
                             {"stages", stages}};
   print_json(json);
 }

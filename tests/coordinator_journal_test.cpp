@@ -383,5 +383,21 @@ TEST_F(JournalTest, FileOfANewerSchema_IsRefusedAndLeftAlone) {
   }
 }
 
+TEST_F(JournalTest, FileThatDoesNotCountItsStarts_IsDamaged) {
+  for (const char* const epoch : {"-1", "4294967295"}) {
+    { const Journal journal(file()); }
+    const std::string set =
+        "UPDATE meta SET value = " + std::string(epoch) + " WHERE key = 'epoch'";
+    Connection(file()).run(set.c_str());
+    try {
+      const Journal journal(file());
+      FAIL() << epoch << ": nothing was thrown";
+    } catch (const core::Error& error) {
+      EXPECT_EQ(error.code(), core::Code::kDataLoss) << epoch;
+    }
+    Connection(file()).run("UPDATE meta SET value = 1 WHERE key = 'epoch'");
+  }
+}
+
 }  // namespace
 }  // namespace weft::coordinator

@@ -3,11 +3,8 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
 
-#include "fabric/tile.h"
 #include "transport/checkpoint.h"
-#include "transport/scene.h"
 #include "worker/baker.h"
 
 // One baker per kind of task; make_baker chooses. Each throws core::Error(kInvalidArgument) on a
@@ -21,13 +18,6 @@ namespace weft::worker {
 [[nodiscard]] std::unique_ptr<Baker> make_coefficients_baker(const BakerContext& context);
 [[nodiscard]] std::unique_ptr<Baker> make_transfer_baker(const BakerContext& context);
 [[nodiscard]] std::unique_ptr<Baker> make_shadow_baker(const BakerContext& context);
-
-// The tile that most stages read, and its rays.
-struct TileScene {
-  explicit TileScene(std::string_view bytes) : tile(fabric::decode_tile(bytes)), scene(tile) {}
-  fabric::Tile tile;
-  transport::Scene scene;
-};
 
 // Throws core::Error(kCancelled) from within long work when `should_stop` says so.
 [[nodiscard]] transport::Checkpoint stop_point(const std::function<bool()>& should_stop);

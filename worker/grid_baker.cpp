@@ -7,6 +7,7 @@
 #include "transport/cell_grid.h"
 #include "transport/seen_segments.h"
 #include "worker/bakers.h"
+#include "worker/tile_scene.h"
 
 namespace weft::worker {
 
@@ -22,7 +23,7 @@ class GridBaker : public Baker {
             "seen_rays_per_segment must be between 1 and 1024");
     require(spec_.cell_length_mfp() > 0 && std::isfinite(spec_.cell_length_mfp()), "grid",
             "cell_length_mfp must be positive");
-    input_ = std::make_unique<TileScene>(context.inputs[0]);
+    input_ = tile_scene(context.inputs[0]);
   }
 
   std::string bake(std::uint64_t shard, const std::string& /*shard_input*/,
@@ -56,7 +57,7 @@ class GridBaker : public Baker {
  private:
   v1::GridSpec spec_;
   std::uint64_t shard_count_;
-  std::unique_ptr<TileScene> input_;
+  std::shared_ptr<const TileScene> input_;
 };
 
 }  // namespace

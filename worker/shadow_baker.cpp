@@ -8,6 +8,7 @@
 #include "transport/shadow_spread.h"
 #include "worker/bakers.h"
 #include "worker/materials.h"
+#include "worker/tile_scene.h"
 
 namespace weft::worker {
 
@@ -33,7 +34,7 @@ class ShadowBaker : public Baker {
     require(shard_count_ == (spec_.paths() + std::uint64_t{spec_.paths_per_shard()} - 1) /
                                 spec_.paths_per_shard(),
             "shadow", "the number of shards is not that of the paths' blocks");
-    input_ = std::make_unique<TileScene>(context.inputs[0]);
+    input_ = tile_scene(context.inputs[0]);
     materials_ = bcsdfs_of(spec_.materials(), input_->tile, "shadow");
     const auto path_mm =
         v1::array_of<float>(v1::parse_arrays(context.inputs[1]), "mean_free_path_mm");
@@ -64,7 +65,7 @@ class ShadowBaker : public Baker {
  private:
   v1::ShadowSpec spec_;
   std::uint64_t shard_count_;
-  std::unique_ptr<TileScene> input_;
+  std::shared_ptr<const TileScene> input_;
   std::vector<shading::FibreBcsdf> materials_;
   transport::SpreadSettings settings_;
 };

@@ -11,6 +11,7 @@
 #include "transport/transfer.h"
 #include "worker/bakers.h"
 #include "worker/materials.h"
+#include "worker/tile_scene.h"
 
 namespace weft::worker {
 
@@ -34,7 +35,7 @@ class TransferBaker : public Baker {
     require(spec_.estimator() == v1::TRANSFER_ESTIMATOR_EXIT ||
                 spec_.estimator() == v1::TRANSFER_ESTIMATOR_LIGHT,
             "transfer", "the estimator must be EXIT or LIGHT");
-    input_ = std::make_unique<TileScene>(context.inputs[0]);
+    input_ = tile_scene(context.inputs[0]);
     materials_ = bcsdfs_of(spec_.materials(), input_->tile, "transfer");
     read_cells(context.inputs[1]);
     blocks_per_cell_ = (std::uint64_t{spec_.paths_per_cell()} + spec_.paths_per_shard() - 1) /
@@ -94,7 +95,7 @@ class TransferBaker : public Baker {
   v1::TransferSpec spec_;
   std::uint64_t shard_count_;
   std::uint64_t blocks_per_cell_ = 1;
-  std::unique_ptr<TileScene> input_;
+  std::shared_ptr<const TileScene> input_;
   std::vector<shading::FibreBcsdf> materials_;
   std::vector<transport::CellSegments> cells_;
 };

@@ -4,6 +4,7 @@
 #include "proto/arrays.h"
 #include "transport/visibility_raster.h"
 #include "worker/bakers.h"
+#include "worker/tile_scene.h"
 
 namespace weft::worker {
 
@@ -15,7 +16,7 @@ class VisibilityBaker : public Baker {
       : resolution_(context.spec.visibility().resolution()), shard_count_(context.shard_count) {
     require_inputs(context, "visibility", 1);
     require_resolution(resolution_, "visibility");
-    input_ = std::make_unique<TileScene>(context.inputs[0]);
+    input_ = tile_scene(context.inputs[0]);
     raster_ = std::make_unique<transport::VisibilityRaster>(input_->scene);
   }
 
@@ -38,7 +39,7 @@ class VisibilityBaker : public Baker {
  private:
   std::uint32_t resolution_;
   std::uint64_t shard_count_;
-  std::unique_ptr<TileScene> input_;
+  std::shared_ptr<const TileScene> input_;
   std::unique_ptr<transport::VisibilityRaster> raster_;  // reads input_
 };
 

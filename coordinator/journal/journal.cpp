@@ -1,9 +1,12 @@
 #include "coordinator/journal/journal.h"
 
 #include <algorithm>
+#include <limits>
+#include <string>
 
 #include "coordinator/journal/schema.h"
 #include "coordinator/journal/state.h"
+#include "core/error.h"
 
 namespace weft::coordinator {
 
@@ -21,18 +24,27 @@ std::uint64_t used_bytes(Connection& connection) {
   return s.step() ? s.number_of(0) : 0;
 }
 
+// Counts this start.
+std::uint32_t next_epoch(Connection& connection) {
+  connection.run("UPDATE meta SET value = value + 1 WHERE key = 'epoch'");
+  Statement counted(connection, "SELECT value FROM meta WHERE key = 'epoch'");
+  const std::int64_t epoch = counted.step() ? counted.signed_of(0) : 0;
+  if (epoch < 1 || epoch > std::numeric_limits<std::uint32_t>::max()) {
+    throw core::Error(
+        core::Code::kDataLoss,
+        "the journal does not say how often it was opened: it is damaged; restore the "
+        "state folder from a backup, or begin with a new one");
+  }
+  return static_cast<std::uint32_t>(epoch);
+}
+
 }  // namespace
 
 void Journal::State::open() {
   connection.run(kPragmas);
   connection.run("BEGIN EXCLUSIVE");
   make_schema(connection);
-  connection.run("UPDATE meta SET value = value + 1 WHERE key = 'epoch'");
-  {
-    Statement counted(connection, "SELECT value FROM meta WHERE key = 'epoch'");
-    counted.step();
-    epoch = static_cast<std::uint32_t>(counted.number_of(0));
-  }
+  epoch = next_epoch(connection);
   connection.run("COMMIT");
   writer.emplace(connection);
   size_bytes = used_bytes(connection);
