@@ -204,6 +204,23 @@ TEST(TransportVisibilityRaster, SeesWhatRaysSeeWhereSegmentsAreLong) {
   compare_raster_with_rays(test::crossed_layers(6, 5, 0.015f, 1), 2);
 }
 
+TEST(TransportVisibilityRaster, WideAndPortablePaths_GiveTheSameBits) {
+  for (const std::uint64_t seed : {31U, 32U, 33U}) {
+    const fabric::Tile tile = test::random_hairs(120, 0.5f, 0.4f, 0.2f, seed);
+    const Scene scene(tile);
+    const VisibilityRaster raster(scene);
+    for (std::uint32_t k = 0; k < tile.segment_count(); k += 29) {
+      for (const std::uint32_t resolution : {40u, 128u}) {
+        const auto chosen = raster.bits(k, resolution);
+        setenv("WEFT_PORTABLE", "1", 1);
+        const auto portable = raster.bits(k, resolution);
+        unsetenv("WEFT_PORTABLE");
+        ASSERT_EQ(chosen, portable) << "segment " << k << ", seed " << seed;
+      }
+    }
+  }
+}
+
 TEST(TransportVisibilityRaster, AnyResolutionThatIsAMultipleOfEight_Works) {
   const fabric::Tile tile = test::crossed_layers(4, 8, 0.02f, 6);
   const Scene scene(tile);

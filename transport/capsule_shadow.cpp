@@ -1,54 +1,26 @@
 #include "transport/capsule_shadow.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
 
 #include <glm/geometric.hpp>
 #include <immintrin.h>
 
-#include "shading/fibre_angle.h"
 #include "transport/sphere.h"
+#include "transport/wide.h"
 
 namespace weft::transport {
 
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
-// Widens rectangles by more than the polynomials and the rounding of float are off.
-constexpr float kMargin = 1e-4f;
-
-// The angle of the point (c, s) of the unit circle's first quadrant.
-float acute_angle(float s, float c) {
-  const float angle = shading::asin_acute(std::min(std::min(s, c), 0.70710678f));
-  return s < c ? angle : 0.5f * kPi - angle;
-}
-
-// asin over [0, 1].
-float arc_sine(float s) { return acute_angle(s, std::sqrt(std::max(0.0f, 1 - s * s))); }
-
-std::uint64_t ones(std::int32_t first, std::int32_t last) {  // bits of one word, clipped to it
-  first = std::max(first, 0);
-  last = std::min(last, 63);
-  return first > last ? 0 : ~std::uint64_t{0} >> (63 - (last - first)) << first;
-}
-
-// Columns first ... last, which may run over the seam at phi = 0.
-void set_columns(ImageRegion& region, std::int32_t first, std::int32_t last, std::int32_t n) {
-  const std::int32_t turn = first < 0 ? n : (last >= n ? -n : 0);
-  for (std::int32_t w = 0; 64 * w < n; ++w) {
-    const std::uint64_t word = ones(first - 64 * w, last - 64 * w) |
-                               (turn == 0 ? 0 : ones(first + turn - 64 * w, last + turn - 64 * w));
-    region.columns[static_cast<std::size_t>(w)] = word & ones(-64 * w, n - 1 - 64 * w);
-  }
-}
 
 // What hides a direction d, in terms of p = d.u, q = d.e1, w = d.e2, where u is the axis, e1 points
 // from the origin to the axis' line and e2 = u x e1; the ends A, B are (s_a, h, 0), (s_b, h, 0).
 // Ball A: |d x A|^2 = w^2 |A|^2 + (p h - q s_a)^2 < r^2 and d.A > 0; no difference of large
 // numbers. Between: the planes through the origin that touch both balls have normals (r/h) e1 +-
 // sqrt(1 - r^2/h^2) e2, hence w^2 (h^2 - r^2) < r^2 q^2 and q > 0; those through the points where
-// they touch ball A are normal to k u - s_a e1 with k = h - r^2/h, hence s_a q < k p < s_b q.
+// they touch ball A are normal to k u - s_a e1 with k = h - r^2/h, hence s_a q < k p < s_b q. The
+// balls, too, lie within the first two planes, which most pixels of a region fail.
 struct Shadow {
   glm::vec3 u;
   glm::vec3 e1;
@@ -84,67 +56,162 @@ Shadow shadow_of(const SeenCapsule& capsule) {
   return s;
 }
 
-// d . axis for eight columns of a row.
-struct RowAxis {
-  RowAxis(glm::vec3 axis, float sin_theta, float cos_theta)
-      : x(_mm256_set1_ps(axis.x * sin_theta)),
-        y(_mm256_set1_ps(axis.y * sin_theta)),
-        z(_mm256_set1_ps(axis.z * cos_theta)) {}
-  [[nodiscard]] __m256 dot(__m256 cos_phi, __m256 sin_phi) const {
-    return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(x, cos_phi), _mm256_mul_ps(y, sin_phi)), z);
-  }
-  __m256 x;
-  __m256 y;
-  __m256 z;
+// With d = (sin(theta) cos(phi), sin(theta) sin(phi), cos(theta)), d . axis is sin(theta) times
+// something of the column plus something of the row. This is the former, for the three axes.
+struct Columns {
+  std::array<float, kMaxMaskResolution> u;
+  std::array<float, kMaxMaskResolution> e1;
+  std::array<float, kMaxMaskResolution> e2;
 };
+
+void set_columns(const Shadow& shadow, const SphereGrid& grid, std::size_t first, std::size_t last,
+                 Columns& columns) {
+  for (std::size_t c = first; c <= last; ++c) {
+    columns.u[c] = shadow.u.x * grid.cos_phi[c] + shadow.u.y * grid.sin_phi[c];
+    columns.e1[c] = shadow.e1.x * grid.cos_phi[c] + shadow.e1.y * grid.sin_phi[c];
+    columns.e2[c] = shadow.e2.x * grid.cos_phi[c] + shadow.e2.y * grid.sin_phi[c];
+  }
+}
+
+// Eight rows: sin(theta) and cos(theta) times the axes' z.
+struct Rows {
+  __m256 sine;
+  __m256 u;
+  __m256 e1;
+  __m256 e2;
+};
+
+__m256 dot(__m256 sine, float of_column, __m256 of_row) {
+  return _mm256_add_ps(_mm256_mul_ps(sine, _mm256_set1_ps(of_column)), of_row);
+}
 
 __m256 less(__m256 a, __m256 b) { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
 
-__m256 in_ball(const Shadow& s, float s_end, float end2, const __m256 (&pqw2)[3]) {
+__m256 in_ball(const Shadow& s, float s_end, float end2, __m256 p, __m256 q, __m256 w2) {
   const __m256 h = _mm256_set1_ps(s.h);
   const __m256 end = _mm256_set1_ps(s_end);
-  const __m256 off = _mm256_sub_ps(_mm256_mul_ps(pqw2[0], h), _mm256_mul_ps(pqw2[1], end));
+  const __m256 off = _mm256_sub_ps(_mm256_mul_ps(p, h), _mm256_mul_ps(q, end));
   const __m256 distance2 =
-      _mm256_add_ps(_mm256_mul_ps(pqw2[2], _mm256_set1_ps(end2)), _mm256_mul_ps(off, off));
-  const __m256 ahead = _mm256_add_ps(_mm256_mul_ps(pqw2[0], end), _mm256_mul_ps(pqw2[1], h));
+      _mm256_add_ps(_mm256_mul_ps(w2, _mm256_set1_ps(end2)), _mm256_mul_ps(off, off));
+  const __m256 ahead = _mm256_add_ps(_mm256_mul_ps(p, end), _mm256_mul_ps(q, h));
   return _mm256_and_ps(less(distance2, _mm256_set1_ps(s.r2)), less(_mm256_setzero_ps(), ahead));
 }
 
-__m256 between_balls(const Shadow& s, const __m256 (&pqw2)[3]) {
-  const __m256 q = pqw2[1];
-  const __m256 kp = _mm256_mul_ps(_mm256_set1_ps(s.k), pqw2[0]);
-  const __m256 inside_planes = less(_mm256_mul_ps(pqw2[2], _mm256_set1_ps(s.tangent2)),
-                                    _mm256_mul_ps(_mm256_set1_ps(s.r2), _mm256_mul_ps(q, q)));
-  const __m256 beyond_a = less(_mm256_mul_ps(_mm256_set1_ps(s.s_a), q), kp);
-  const __m256 before_b = less(kp, _mm256_mul_ps(_mm256_set1_ps(s.s_b), q));
-  return _mm256_and_ps(_mm256_and_ps(inside_planes, less(_mm256_setzero_ps(), q)),
-                       _mm256_and_ps(beyond_a, before_b));
+// Which of eight pixels of a column are hidden: bit i for the row that lane i holds.
+std::uint64_t hidden(const Shadow& s, const Rows& rows, const Columns& columns,
+                     std::size_t column) {
+  const __m256 q = dot(rows.sine, columns.e1[column], rows.e1);
+  const __m256 w = dot(rows.sine, columns.e2[column], rows.e2);
+  const __m256 w2 = _mm256_mul_ps(w, w);
+  __m256 may = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+  if (s.tangent2 > 0) {
+    may = _mm256_and_ps(less(_mm256_setzero_ps(), q),
+                        less(_mm256_mul_ps(w2, _mm256_set1_ps(s.tangent2)),
+                             _mm256_mul_ps(_mm256_set1_ps(s.r2), _mm256_mul_ps(q, q))));
+    if (_mm256_movemask_ps(may) == 0) {
+      return 0;
+    }
+  }
+  const __m256 p = dot(rows.sine, columns.u[column], rows.u);
+  __m256 any = _mm256_or_ps(in_ball(s, s.s_a, s.a2, p, q, w2), in_ball(s, s.s_b, s.b2, p, q, w2));
+  if (s.tangent2 > 0) {
+    const __m256 kp = _mm256_mul_ps(_mm256_set1_ps(s.k), p);
+    any = _mm256_or_ps(any, _mm256_and_ps(less(_mm256_mul_ps(_mm256_set1_ps(s.s_a), q), kp),
+                                          less(kp, _mm256_mul_ps(_mm256_set1_ps(s.s_b), q))));
+  }
+  return static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_and_ps(may, any)));
 }
 
-// The eight pixels of a row from column `first` on: bit i for column first + i.
-struct RowShadow {
-  RowShadow(const Shadow& shadow_in, float sin_theta, float cos_theta)
-      : shadow(shadow_in),
-        u(shadow_in.u, sin_theta, cos_theta),
-        e1(shadow_in.e1, sin_theta, cos_theta),
-        e2(shadow_in.e2, sin_theta, cos_theta) {}
-  [[nodiscard]] std::uint64_t eight(const SphereGrid& grid, std::size_t first) const {
-    const __m256 cos_phi = _mm256_loadu_ps(&grid.cos_phi[first]);
-    const __m256 sin_phi = _mm256_loadu_ps(&grid.sin_phi[first]);
-    const __m256 w = e2.dot(cos_phi, sin_phi);
-    const __m256 pqw2[3] = {u.dot(cos_phi, sin_phi), e1.dot(cos_phi, sin_phi), _mm256_mul_ps(w, w)};
-    __m256 hidden = _mm256_or_ps(in_ball(shadow, shadow.s_a, shadow.a2, pqw2),
-                                 in_ball(shadow, shadow.s_b, shadow.b2, pqw2));
-    if (shadow.tangent2 > 0) {
-      hidden = _mm256_or_ps(hidden, between_balls(shadow, pqw2));
-    }
-    return static_cast<std::uint64_t>(static_cast<unsigned>(_mm256_movemask_ps(hidden)));
-  }
-  const Shadow& shadow;
-  RowAxis u;
-  RowAxis e1;
-  RowAxis e2;
+// The same, operation by operation, for sixteen rows.
+struct WideRows {
+  __m512 sine;
+  __m512 u;
+  __m512 e1;
+  __m512 e2;
 };
+
+WEFT_WIDE inline __m512 dot(__m512 sine, float of_column, __m512 of_row) {
+  return _mm512_add_ps(_mm512_mul_ps(sine, _mm512_set1_ps(of_column)), of_row);
+}
+
+WEFT_WIDE inline __mmask16 less(__mmask16 among, __m512 a, __m512 b) {
+  return _mm512_mask_cmp_ps_mask(among, a, b, _CMP_LT_OQ);
+}
+
+WEFT_WIDE inline __mmask16 in_ball(__mmask16 may, const Shadow& s, float s_end, float end2,
+                                   const __m512 (&pqw2)[3]) {
+  const __m512 h = _mm512_set1_ps(s.h);
+  const __m512 end = _mm512_set1_ps(s_end);
+  const __m512 off = _mm512_sub_ps(_mm512_mul_ps(pqw2[0], h), _mm512_mul_ps(pqw2[1], end));
+  const __m512 distance2 =
+      _mm512_add_ps(_mm512_mul_ps(pqw2[2], _mm512_set1_ps(end2)), _mm512_mul_ps(off, off));
+  const __m512 ahead = _mm512_add_ps(_mm512_mul_ps(pqw2[0], end), _mm512_mul_ps(pqw2[1], h));
+  return less(less(may, distance2, _mm512_set1_ps(s.r2)), _mm512_setzero_ps(), ahead);
+}
+
+WEFT_WIDE inline std::uint64_t hidden(const Shadow& s, const WideRows& rows, float of_u,
+                                      float of_e1, float of_e2) {
+  const __m512 q = dot(rows.sine, of_e1, rows.e1);
+  const __m512 w = dot(rows.sine, of_e2, rows.e2);
+  const __m512 w2 = _mm512_mul_ps(w, w);
+  __mmask16 may = 0xffff;
+  if (s.tangent2 > 0) {
+    may = less(less(may, _mm512_setzero_ps(), q), _mm512_mul_ps(w2, _mm512_set1_ps(s.tangent2)),
+               _mm512_mul_ps(_mm512_set1_ps(s.r2), _mm512_mul_ps(q, q)));
+    if (may == 0) {
+      return 0;
+    }
+  }
+  const __m512 pqw2[3] = {dot(rows.sine, of_u, rows.u), q, w2};
+  std::uint32_t any = static_cast<std::uint32_t>(in_ball(may, s, s.s_a, s.a2, pqw2)) |
+                      static_cast<std::uint32_t>(in_ball(may, s, s.s_b, s.b2, pqw2));
+  if (s.tangent2 > 0) {
+    const __m512 kp = _mm512_mul_ps(_mm512_set1_ps(s.k), pqw2[0]);
+    any |= less(less(may, _mm512_mul_ps(_mm512_set1_ps(s.s_a), q), kp), kp,
+                _mm512_mul_ps(_mm512_set1_ps(s.s_b), q));
+  }
+  return any;
+}
+
+// Rows `first` ... and columns first_column ... last_column of the image.
+struct Strip {
+  std::size_t first_row;
+  std::size_t first_column;
+  std::size_t last_column;
+};
+
+void paint_rows(const Shadow& shadow, const Columns& columns, const Strip& strip,
+                const SphereGrid& grid, CoverMask& mask) {
+  const __m256 cosine = _mm256_loadu_ps(&grid.cos_theta[strip.first_row]);
+  const Rows rows{_mm256_loadu_ps(&grid.sin_theta[strip.first_row]),
+                  _mm256_mul_ps(_mm256_set1_ps(shadow.u.z), cosine),
+                  _mm256_mul_ps(_mm256_set1_ps(shadow.e1.z), cosine),
+                  _mm256_mul_ps(_mm256_set1_ps(shadow.e2.z), cosine)};
+  const std::size_t word = strip.first_row / 64;
+  const std::size_t shift = strip.first_row % 64;
+  for (std::size_t c = strip.first_column; c <= strip.last_column; ++c) {
+    if ((mask.open_rows(word, c) >> shift & 0xffU) != 0) {
+      mask.cover(word, c, hidden(shadow, rows, columns, c) << shift);
+    }
+  }
+}
+
+WEFT_WIDE void paint_rows_wide(const Shadow& shadow, const Columns& columns, const Strip& strip,
+                               const SphereGrid& grid, CoverMask& mask) {
+  const __m512 cosine = _mm512_loadu_ps(grid.cos_theta.data() + strip.first_row);
+  const WideRows rows{_mm512_loadu_ps(grid.sin_theta.data() + strip.first_row),
+                      _mm512_mul_ps(_mm512_set1_ps(shadow.u.z), cosine),
+                      _mm512_mul_ps(_mm512_set1_ps(shadow.e1.z), cosine),
+                      _mm512_mul_ps(_mm512_set1_ps(shadow.e2.z), cosine)};
+  const std::size_t word = strip.first_row / 64;
+  const std::size_t shift = strip.first_row % 64;
+  for (std::size_t c = strip.first_column; c <= strip.last_column; ++c) {
+    if ((mask.open_rows(word, c) >> shift & 0xffffU) != 0) {
+      mask.cover(word, c,
+                 hidden(shadow, rows, columns.u[c], columns.e1[c], columns.e2[c]) << shift);
+    }
+  }
+}
 
 }  // namespace
 
@@ -155,6 +222,8 @@ SphereGrid::SphereGrid(std::uint32_t resolution_in) : resolution(resolution_in) 
     sin_phi.push_back(static_cast<float>(std::sin(column_phi(i, resolution))));
     cos_phi.push_back(static_cast<float>(std::cos(column_phi(i, resolution))));
   }
+  sin_theta.resize((sin_theta.size() + 15) / 16 * 16);
+  cos_theta.resize(sin_theta.size());
 }
 
 bool holds_origin(const SeenCapsule& capsule) {
@@ -163,66 +232,28 @@ bool holds_origin(const SeenCapsule& capsule) {
   return glm::dot(off, off) < capsule.radius * capsule.radius;
 }
 
-bool find_open_region(glm::vec3 centre, float radius, const CoverMask& mask, ImageRegion& region) {
-  const auto n = static_cast<std::int32_t>(mask.resolution());
-  const float across2 = centre.x * centre.x + centre.y * centre.y;
-  const float distance = std::sqrt(across2 + centre.z * centre.z);
-  if (distance <= 1.0001f * radius) {
-    region.first_row = 0;
-    region.last_row = n - 1;
-    set_columns(region, 0, n - 1, n);
-    return !mask.is_covered(region);
-  }
-  const float across = std::sqrt(across2);
-  const float elevation = acute_angle(across / distance, std::abs(centre.z) / distance);
-  const float theta = centre.z > 0 ? elevation : kPi - elevation;
-  const float alpha = arc_sine(std::min(1.0f, radius / distance)) + kMargin;
-  const float rows_per_radian = static_cast<float>(n) / kPi;
-  region.first_row =
-      std::max(0, static_cast<std::int32_t>(std::ceil((theta - alpha) * rows_per_radian - 0.5f)));
-  region.last_row = std::min(
-      n - 1, static_cast<std::int32_t>(std::floor((theta + alpha) * rows_per_radian - 0.5f)));
-  region.first_row = mask.next_open_row(region.first_row, region.last_row);
-  if (region.first_row < 0) {
-    return false;  // most balls end here in dense cloth
-  }
-  if (across <= 1.0001f * radius || theta - alpha <= 0 || theta + alpha >= kPi) {
-    set_columns(region, 0, n - 1, n);
-    return !mask.is_covered(region);
-  }
-  const float turn = acute_angle(std::abs(centre.y) / across, std::abs(centre.x) / across);
-  const float half = centre.x > 0 ? turn : kPi - turn;
-  const float phi = centre.y > 0 ? half : 2 * kPi - half;
-  // sin(dphi) = sin(alpha) / sin(theta) bounds the azimuths of a cap; the margin grows likewise.
-  const float width = arc_sine(std::min(1.0f, radius / across)) + kMargin * (1 + distance / across);
-  const float columns_per_radian = 0.5f * rows_per_radian;
-  const auto first =
-      static_cast<std::int32_t>(std::ceil((phi - width) * columns_per_radian - 0.5f));
-  const auto last =
-      static_cast<std::int32_t>(std::floor((phi + width) * columns_per_radian - 0.5f));
-  if (first > last) {
-    return false;
-  }
-  set_columns(region, first, std::min(last, first + n - 1), n);
-  return !mask.is_covered(region);
-}
-
-void paint(const SeenCapsule& capsule, const ImageRegion& region, const SphereGrid& grid,
+void paint(const SeenCapsule& capsule, const ImageRegion& region, const SphereGrid& grid, bool wide,
            CoverMask& mask) {
   const Shadow shadow = shadow_of(capsule);
-  for (std::int32_t r = mask.next_open_row(region.first_row, region.last_row); r >= 0;
-       r = mask.next_open_row(r + 1, region.last_row)) {
-    const auto row = static_cast<std::uint32_t>(r);
-    const RowShadow in_row(shadow, grid.sin_theta[row], grid.cos_theta[row]);
-    std::uint64_t* bits = mask.row(row);
-    for (std::size_t w = 0; w < mask.words(); ++w) {
-      for (std::uint64_t open = ~bits[w] & region.columns[w]; open != 0;) {
-        const int byte = std::countr_zero(open) / 8;
-        bits[w] |= in_row.eight(grid, 64 * w + 8 * static_cast<std::size_t>(byte)) << (8 * byte);
-        open &= ~(std::uint64_t{0xff} << (8 * byte));
+  const std::size_t step = wide ? 16 : 8;
+  const auto n = static_cast<std::int32_t>(grid.resolution);
+  Columns columns;  // only what is asked for is set
+  for (const std::int32_t turn : {0, n, -n}) {
+    const std::int32_t first = std::max(region.first_column + turn, 0);
+    const std::int32_t last = std::min(region.last_column + turn, n - 1);
+    if (first > last) {
+      continue;
+    }
+    Strip strip{0, static_cast<std::size_t>(first), static_cast<std::size_t>(last)};
+    set_columns(shadow, grid, strip.first_column, strip.last_column, columns);
+    strip.first_row = static_cast<std::size_t>(region.first_row) / step * step;
+    for (; strip.first_row <= static_cast<std::size_t>(region.last_row); strip.first_row += step) {
+      if (wide) {
+        paint_rows_wide(shadow, columns, strip, grid, mask);
+      } else {
+        paint_rows(shadow, columns, strip, grid, mask);
       }
     }
-    mask.close_if_full(row);
   }
 }
 

@@ -12,7 +12,7 @@ namespace weft::transport {
 struct SphereGrid {
   explicit SphereGrid(std::uint32_t resolution);
   std::uint32_t resolution;
-  std::vector<float> sin_theta;  // [rows]
+  std::vector<float> sin_theta;  // [rows], zeros beyond up to a multiple of sixteen
   std::vector<float> cos_theta;
   std::vector<float> sin_phi;  // [columns]
   std::vector<float> cos_phi;
@@ -29,16 +29,11 @@ struct SeenCapsule {
 
 [[nodiscard]] bool holds_origin(const SeenCapsule& capsule);
 
-// Finds a rectangle that holds every pixel whose centre a ball hides from the origin, the whole
-// image when the ball holds the origin. False when it has no pixel that `mask` does not cover yet;
-// `region`, which the caller keeps for the next ball, is then of no meaning.
-[[nodiscard]] bool find_open_region(glm::vec3 centre, float radius, const CoverMask& mask,
-                                    ImageRegion& region);
-
 // Covers the pixels of `region` whose centres the capsule hides. Exact: seen from a point outside,
 // a capsule hides the caps of its two balls and the quadrilateral between two tangent planes.
+// `wide`: wide_is_available() said yes; the bits are the same.
 // REQUIRES: !holds_origin(capsule).
-void paint(const SeenCapsule& capsule, const ImageRegion& region, const SphereGrid& grid,
+void paint(const SeenCapsule& capsule, const ImageRegion& region, const SphereGrid& grid, bool wide,
            CoverMask& mask);
 
 }  // namespace weft::transport

@@ -11,55 +11,116 @@ namespace weft::transport {
 namespace {
 
 constexpr float kPieceRadii = 8;
-constexpr std::uint32_t kLeafPieces = 4;
+constexpr std::uint32_t kLanes = Balls::kCount;
 constexpr double kMaxPieces = 1 << 25;
 
 glm::vec3 middle(const Piece& piece) {
   return piece.start_mm + 0.5f * piece.length_mm * piece.axis;
 }
 
-// Children are built by a stack, not by recursion: a subtree is (node, first piece, one past last).
-struct Task {
-  std::uint32_t node;
+// Pieces first ... last - 1, which are to be a node or, when there are few, a leaf.
+struct Range {
   std::uint32_t first;
   std::uint32_t last;
+  [[nodiscard]] std::uint32_t count() const { return last - first; }
 };
 
-// Splits at the median of the longest axis of the middles; ties are broken by the axis' order and
-// the order that nth_element leaves, which is the same everywhere for one standard library.
-std::uint32_t split(std::vector<Piece>& pieces, const Task& task) {
+// Splits near the median of the longest axis of the middles, so that the lower part fills its
+// leaves; ties are broken by the axis' order and the order that nth_element leaves, which is the
+// same everywhere for one standard library.
+std::uint32_t split(std::vector<Piece>& pieces, const Range& range) {
   glm::vec3 low(1e30f);
   glm::vec3 high(-1e30f);
-  for (std::uint32_t i = task.first; i < task.last; ++i) {
+  for (std::uint32_t i = range.first; i < range.last; ++i) {
     low = glm::min(low, middle(pieces[i]));
     high = glm::max(high, middle(pieces[i]));
   }
   const glm::vec3 extent = high - low;
   const int axis =
       extent.x >= extent.y ? (extent.x >= extent.z ? 0 : 2) : (extent.y >= extent.z ? 1 : 2);
-  const std::uint32_t half = task.first + (task.last - task.first) / 2;
+  const std::uint32_t leaves = (range.count() + kLanes - 1) / kLanes;
+  const std::uint32_t half = range.first + leaves / 2 * kLanes;
   std::nth_element(
-      pieces.begin() + task.first, pieces.begin() + half, pieces.begin() + task.last,
+      pieces.begin() + range.first, pieces.begin() + half, pieces.begin() + range.last,
       [axis](const Piece& a, const Piece& b) { return middle(a)[axis] < middle(b)[axis]; });
   return half;
 }
 
-TreeNode ball_of(const std::vector<Piece>& pieces, const Task& task) {
+// Splits the range with the most pieces until there are sixteen, or all are leaves.
+std::vector<Range> children_of(std::vector<Piece>& pieces, const Range& range) {
+  std::vector<Range> children{range};
+  while (children.size() < kLanes) {
+    const auto largest =
+        std::max_element(children.begin(), children.end(),
+                         [](const Range& a, const Range& b) { return a.count() < b.count(); });
+    if (largest->count() <= kLanes) {
+      break;
+    }
+    const std::uint32_t half = split(pieces, *largest);
+    const Range upper{half, largest->last};
+    largest->last = half;
+    children.insert(largest + 1, upper);
+  }
+  return children;
+}
+
+void set_ball(Balls& balls, std::size_t lane, glm::vec3 centre, float radius) {
+  balls.x[lane] = centre.x;
+  balls.y[lane] = centre.y;
+  balls.z[lane] = centre.z;
+  balls.radius[lane] = radius * 1.00001f;
+}
+
+void set_ball_of_pieces(const std::vector<Piece>& pieces, const Range& range, Balls& balls,
+                        std::size_t lane) {
   glm::vec3 low(1e30f);
   glm::vec3 high(-1e30f);
-  for (std::uint32_t i = task.first; i < task.last; ++i) {
+  for (std::uint32_t i = range.first; i < range.last; ++i) {
     const glm::vec3 end = pieces[i].start_mm + pieces[i].length_mm * pieces[i].axis;
     low = glm::min(low, glm::min(pieces[i].start_mm, end) - pieces[i].radius_mm);
     high = glm::max(high, glm::max(pieces[i].start_mm, end) + pieces[i].radius_mm);
   }
-  TreeNode node{0.5f * (low + high), 0, task.first, task.last - task.first};
-  for (std::uint32_t i = task.first; i < task.last; ++i) {
+  const glm::vec3 centre = 0.5f * (low + high);
+  float radius = 0;
+  for (std::uint32_t i = range.first; i < range.last; ++i) {
     const glm::vec3 end = pieces[i].start_mm + pieces[i].length_mm * pieces[i].axis;
-    const float reach = std::max(glm::distance(pieces[i].start_mm, node.centre_mm),
-                                 glm::distance(end, node.centre_mm));
-    node.radius_mm = std::max(node.radius_mm, (reach + pieces[i].radius_mm) * 1.00001f);
+    const float reach =
+        std::max(glm::distance(pieces[i].start_mm, centre), glm::distance(end, centre));
+    radius = std::max(radius, reach + pieces[i].radius_mm);
   }
-  return node;
+  set_ball(balls, lane, centre, radius);
+}
+
+TreeNode leaf_of(const std::vector<Piece>& pieces, const Range& range) {
+  TreeNode leaf{{}, range.first, range.count(), true};
+  for (std::uint32_t i = 0; i < range.count(); ++i) {
+    const Piece& piece = pieces[range.first + i];
+    set_ball(leaf.balls_mm, i, middle(piece), 0.5f * piece.length_mm + piece.radius_mm);
+  }
+  return leaf;
+}
+
+// Nodes are made from the root on, those of one parent together.
+std::vector<TreeNode> tree_of(std::vector<Piece>& pieces) {
+  std::vector<TreeNode> nodes(1);
+  std::vector<Range> ranges{{0, static_cast<std::uint32_t>(pieces.size())}};
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (ranges[i].count() <= kLanes) {
+      nodes[i] = leaf_of(pieces, ranges[i]);
+      continue;
+    }
+    const std::vector<Range> children = children_of(pieces, ranges[i]);
+    nodes[i] = {{},
+                static_cast<std::uint32_t>(nodes.size()),
+                static_cast<std::uint32_t>(children.size()),
+                false};
+    for (std::size_t c = 0; c < children.size(); ++c) {
+      set_ball_of_pieces(pieces, children[c], nodes[i].balls_mm, c);
+    }
+    ranges.insert(ranges.end(), children.begin(), children.end());
+    nodes.resize(ranges.size());
+  }
+  return nodes;
 }
 
 void add_pieces(const Scene& scene, std::uint32_t k, glm::ivec2 tile_of_block,
@@ -111,23 +172,7 @@ CapsuleTree::CapsuleTree(const Scene& scene) {
       }
     }
   }
-  nodes.emplace_back();
-  std::vector<Task> stack{{0, 0, static_cast<std::uint32_t>(pieces.size())}};
-  while (!stack.empty()) {
-    const Task task = stack.back();
-    stack.pop_back();
-    nodes[task.node] = ball_of(pieces, task);
-    if (task.last - task.first > kLeafPieces) {
-      const std::uint32_t half = split(pieces, task);
-      const auto children = static_cast<std::uint32_t>(nodes.size());
-      nodes[task.node].first = children;
-      nodes[task.node].count = 0;
-      nodes.emplace_back();
-      nodes.emplace_back();
-      stack.push_back({children, task.first, half});
-      stack.push_back({children + 1, half, task.last});
-    }
-  }
+  nodes = tree_of(pieces);
 }
 
 }  // namespace weft::transport

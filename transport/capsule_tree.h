@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -7,6 +8,7 @@
 #include <glm/vec3.hpp>
 
 #include "fabric/tile.h"
+#include "transport/ball_regions.h"
 #include "transport/scene.h"
 
 namespace weft::transport {
@@ -20,16 +22,17 @@ struct Piece {
   StrandCopy copy;  // when the piece's block is at the origin
 };
 
-// A ball round the pieces of a subtree. Inner nodes have their children at `first` and first + 1.
+// Balls round what is below. A leaf's are those of pieces first ... first + count - 1, an inner
+// node's those of nodes first ... first + count - 1.
 struct TreeNode {
-  glm::vec3 centre_mm;
-  float radius_mm;
+  Balls balls_mm;
   std::uint32_t first;
-  std::uint32_t count;  // pieces of a leaf; 0: an inner node
+  std::uint32_t count;
+  bool is_leaf;
 };
 
 // The capsules of one block (as many tiles as make it at least as long as it is thick, or 1) in a
-// hierarchy of balls, the root at nodes[0]. The same for the same tile.
+// hierarchy of balls, sixteen to a node, the root at nodes[0]. The same for the same tile.
 struct CapsuleTree {
   explicit CapsuleTree(const Scene& scene);
 

@@ -1,17 +1,17 @@
 #include "transport/visibility_raster.h"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
-#include <glm/geometric.hpp>
-
 #include "core/check.h"
 #include "transport/bake_point.h"
+#include "transport/ball_regions.h"
 #include "transport/capsule_shadow.h"
 #include "transport/capsule_tree.h"
 #include "transport/cover_mask.h"
+#include "transport/wide.h"
 
 namespace weft::transport {
 
@@ -22,7 +22,11 @@ class Painter {
  public:
   Painter(const Scene& scene, const CapsuleTree& tree, const SphereGrid& grid,
           std::uint32_t segment)
-      : scene_(scene), tree_(tree), grid_(grid), mask_(grid.resolution) {
+      : scene_(scene),
+        tree_(tree),
+        grid_(grid),
+        wide_(wide_is_available()),
+        mask_(grid.resolution) {
     const BakePoint point = bake_point(scene, segment);
     eye_mm_ = point.position_mm;
     own_ = point.own;
@@ -40,21 +44,27 @@ class Painter {
       }
     }
     if (blind_) {
-      cover_everything();
+      mask_.cover_all();
     }
     return std::move(mask_);
   }
 
  private:
-  static constexpr std::size_t kMaxStack = 128;
+  // A node that waits to be looked into.
+  struct Visit {
+    std::uint32_t node;
+    float distance2;
+    ImageRegion region;
+  };
 
   // Whether all pixels are covered that blocks of this ring or beyond could cover: those lie at
   // least so far away that the cloth's faces are within a band round the horizon.
   [[nodiscard]] bool is_covered_beyond(int ring) const {
+    const auto n = static_cast<std::int32_t>(grid_.resolution);
     const double away = (ring - 1) * std::min(tree_.size_mm.x, tree_.size_mm.y) -
                         static_cast<double>(tree_.overhang_mm);
     if (away <= 0) {
-      return mask_.is_all_covered();
+      return !is_open_between(0, n - 1);
     }
     const double up = std::max(0.0, static_cast<double>(tree_.z_max_mm - eye_mm_.z));
     const double down = std::max(0.0, static_cast<double>(eye_mm_.z - tree_.z_min_mm));
@@ -64,8 +74,11 @@ class Painter {
         std::ceil((std::numbers::pi / 2 - std::atan2(up, away)) * rows - 0.5 - margin));
     const auto last = static_cast<std::int32_t>(
         std::floor((std::numbers::pi / 2 + std::atan2(down, away)) * rows - 0.5 + margin));
-    return mask_.next_open_row(std::max(0, first),
-                               std::min(last, static_cast<std::int32_t>(grid_.resolution) - 1)) < 0;
+    return !is_open_between(std::max(0, first), std::min(last, n - 1));
+  }
+
+  [[nodiscard]] bool is_open_between(std::int32_t first_row, std::int32_t last_row) const {
+    return mask_.is_open({first_row, last_row, 0, static_cast<std::int32_t>(grid_.resolution) - 1});
   }
 
   void paint_block(glm::ivec2 block) {
@@ -73,33 +86,45 @@ class Painter {
                           static_cast<float>(block.y * tree_.size_mm.y), 0) -
                 eye_mm_;
     shift_tiles_ = block * tree_.tiles;
-    std::array<std::uint32_t, kMaxStack> stack{};
-    std::size_t depth = 0;
-    stack[depth++] = 0;
-    while (depth > 0 && !blind_) {
-      const TreeNode& node = tree_.nodes[stack[--depth]];
-      if (!find_open_region(node.centre_mm + shift_mm_, node.radius_mm, mask_, region_)) {
-        continue;
+    stack_.clear();
+    stack_.push_back({0, 0, {}});
+    for (bool is_root = true; !stack_.empty() && !blind_; is_root = false) {
+      const Visit visit = stack_.back();
+      stack_.pop_back();
+      if (!is_root && !mask_.is_open(visit.region)) {
+        continue;  // by what was painted since it was put aside
       }
-      if (node.count > 0) {
+      const TreeNode& node = tree_.nodes[visit.node];
+      bound(node.balls_mm, shift_mm_, grid_.resolution, wide_, regions_);
+      if (node.is_leaf) {
         paint_leaf(node);
-        continue;
+      } else {
+        put_aside(node);
       }
-      CHECK_LT(depth + 2, kMaxStack);
-      const bool swap = distance2(node.first + 1) < distance2(node.first);
-      stack[depth++] = swap ? node.first : node.first + 1;  // the nearer one is popped first
-      stack[depth++] = swap ? node.first + 1 : node.first;
     }
   }
 
-  [[nodiscard]] float distance2(std::uint32_t node) const {
-    const glm::vec3 off = tree_.nodes[node].centre_mm + shift_mm_;
-    return glm::dot(off, off);
+  // The node's children that may hide something, so that the nearest one is taken up first.
+  void put_aside(const TreeNode& node) {
+    const auto first_new = static_cast<std::ptrdiff_t>(stack_.size());
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      const ImageRegion region = regions_.region(i);
+      if (mask_.is_open(region)) {
+        stack_.push_back({node.first + i, regions_.distance2[i], region});
+      }
+    }
+    std::sort(stack_.begin() + first_new, stack_.end(), [](const Visit& a, const Visit& b) {
+      return a.distance2 != b.distance2 ? a.distance2 > b.distance2 : a.node > b.node;
+    });
   }
 
   void paint_leaf(const TreeNode& node) {
-    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-      const Piece& piece = tree_.pieces[i];
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      const ImageRegion region = regions_.region(i);
+      if (!mask_.is_open(region)) {
+        continue;  // most end here in dense cloth
+      }
+      const Piece& piece = tree_.pieces[node.first + i];
       if (piece.copy.strand == own_.strand && is_own(piece)) {
         continue;
       }
@@ -109,11 +134,7 @@ class Painter {
         blind_ = true;
         return;
       }
-      const glm::vec3 centre = capsule.start + 0.5f * capsule.length * capsule.axis;
-      const float reach = 0.5f * capsule.length + capsule.radius;
-      if (find_open_region(centre, reach, mask_, region_)) {
-        paint(capsule, region_, grid_, mask_);
-      }
+      paint(capsule, region, grid_, wide_, mask_);
     }
   }
 
@@ -123,20 +144,16 @@ class Painter {
                             {0, 0}) == own_;
   }
 
-  void cover_everything() {
-    for (std::uint32_t r = 0; r < grid_.resolution; ++r) {
-      std::fill_n(mask_.row(r), mask_.words(), ~std::uint64_t{0});
-    }
-  }
-
   const Scene& scene_;
   const CapsuleTree& tree_;
   const SphereGrid& grid_;
+  bool wide_;
   glm::vec3 eye_mm_{0, 0, 0};
   StrandCopy own_;
   CoverMask mask_;
-  ImageRegion region_;  // scratch
-  bool blind_ = false;  // the eye is inside another fibre
+  std::vector<Visit> stack_;
+  BallRegions regions_;  // of the node at hand
+  bool blind_ = false;   // the eye is inside another fibre
   glm::vec3 shift_mm_{0, 0, 0};
   glm::ivec2 shift_tiles_{0, 0};
 };
@@ -160,11 +177,14 @@ std::vector<std::uint8_t> VisibilityRaster::bits(std::uint32_t segment, std::uin
   const SphereGrid grid(resolution);
   Painter painter(state_->scene, state_->tree, grid, segment);
   const CoverMask mask = painter.paint_all(checkpoint);
-  std::vector<std::uint8_t> bits;
-  bits.reserve(std::size_t{resolution} * resolution / 8);
-  for (std::uint32_t r = 0; r < resolution; ++r) {
-    for (std::uint32_t byte = 0; byte < resolution / 8; ++byte) {
-      bits.push_back(static_cast<std::uint8_t>(~mask.row(r)[byte / 8] >> (8 * (byte % 8))));
+  std::vector<std::uint8_t> bits(std::size_t{resolution} * resolution / 8);
+  for (std::size_t w = 0; w < mask.words(); ++w) {
+    for (std::size_t c = 0; c < resolution; ++c) {
+      for (std::uint64_t open = mask.open_rows(w, c); open != 0; open &= open - 1) {
+        const std::size_t row = 64 * w + static_cast<std::size_t>(std::countr_zero(open));
+        std::uint8_t& byte = bits[(row * resolution + c) / 8];
+        byte = static_cast<std::uint8_t>(byte | 1U << (c % 8));
+      }
     }
   }
   return bits;
