@@ -5,19 +5,24 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <new>
+#include <string>
 
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "core/error.h"
+#include "fuzz/library_report.h"
 #include "fuzz/target.h"
 
 // The counters of libFuzzer's coverage, which the linker finds; nothing in a build without it.
 extern "C" {
 extern char __start___sancov_cntrs[] __attribute__((weak));
 extern char __stop___sancov_cntrs[] __attribute__((weak));
+// AddressSanitizer's, where the program is built with it.
+void __asan_set_error_report_callback(void (*callback)(const char*)) __attribute__((weak));
 }
 
 // A crash of a library is a signal to the parent; what a sanitizer finds, an exit code of its own.
@@ -33,6 +38,7 @@ namespace {
 
 constexpr unsigned kSecondsLimit = 20;
 constexpr int kUnexpected = 76;
+constexpr int kLibraryBroke = 78;
 
 struct Counts {
   unsigned long runs = 0;
@@ -66,7 +72,19 @@ char* shared_coverage() {
   return shared;
 }
 
+// A library that uses its own memory wrongly would go on or crash without the sanitizer, and is
+// contained either way.
+void end_if_in_library(const char* report) {
+  static const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  if (is_in_library(report, program)) {
+    ::_exit(kLibraryBroke);
+  }
+}
+
 [[noreturn]] void be_child(const std::function<void()>& parse, char* coverage) {
+  if (__asan_set_error_report_callback != nullptr) {
+    __asan_set_error_report_callback(end_if_in_library);
+  }
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM, SIGTERM}) {
     (void)std::signal(signal, SIG_DFL);  // libFuzzer's are the parent's
   }
@@ -105,7 +123,8 @@ void run_apart(const std::function<void()>& parse) {
   }
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM) {
     ++counts.timeouts;
-  } else if (WIFSIGNALED(status) && WTERMSIG(status) != SIGABRT) {
+  } else if (WIFSIGNALED(status) ? WTERMSIG(status) != SIGABRT
+                                 : WEXITSTATUS(status) == kLibraryBroke) {
     ++counts.crashes;
   } else if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     std::fprintf(stderr, "the child ended with status %d\n", status);

@@ -13,6 +13,7 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/mistakes.h"
+#include "storage/h5_chunks.h"
 #include "storage/h5_types.h"
 
 namespace weft::storage::h5 {
@@ -24,73 +25,8 @@ constexpr std::uint64_t kReadAllowanceBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kReadRatio = 32;
 constexpr std::uint64_t kMaxDeflateRatio = 1032;  // of the deflate format (zlib's own figure)
 constexpr int kMaxRank = 8;
-constexpr std::size_t kLinksLimit = 64;    // of a group
-constexpr std::uint64_t kIndexBytes = 16;  // of a chunk in the file, at least
+constexpr std::size_t kLinksLimit = 64;  // of a group
 constexpr std::array<unsigned char, 8> kSignature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
-
-// The chunks of a dataset: small enough, and as many as the file can index. Returns how many the
-// shape needs.
-std::uint64_t check_chunks(Id properties, const std::string& path, const DatasetSource::Info& info,
-                           std::uint64_t file_bytes) {
-  std::vector<hsize_t> chunk(info.shape.size());
-  const int rank = static_cast<int>(chunk.size());
-  if (H5Pget_chunk(properties, rank, chunk.data()) != rank) {
-    throw_damaged(path, "has damaged chunks");
-  }
-  std::uint64_t chunks = 1;
-  for (std::size_t axis = 0; axis < chunk.size(); ++axis) {
-    if (chunk[axis] == 0 || chunk[axis] > info.shape[axis]) {
-      throw_damaged(path, "has chunks that are larger than itself");
-    }
-    const std::uint64_t along = (info.shape[axis] - 1) / chunk[axis] + 1;
-    if (along > file_bytes / kIndexBytes / chunks + 1) {
-      throw_damaged(path, "has more chunks than the file can hold");
-    }
-    chunks *= along;
-  }
-  const auto chunk_bytes = bytes_of(Shape(chunk.begin(), chunk.end()), info.element_bytes);
-  if (!chunk_bytes || *chunk_bytes > kChunkLimitBytes) {
-    throw_damaged(
-        path, "has chunks above the limit of " + std::to_string(kChunkLimitBytes >> 20) + " MiB");
-  }
-  return chunks;
-}
-
-void check_filters(Id properties, const std::string& path) {
-  constexpr int kFiltersLimit = 3;
-  const int filters = H5Pget_nfilters(properties);
-  for (int i = 0; i < filters; ++i) {
-    unsigned flags = 0;
-    std::size_t values = 0;
-    const H5Z_filter_t filter = H5Pget_filter2(properties, static_cast<unsigned>(i), &flags,
-                                               &values, nullptr, 0, nullptr, nullptr);
-    if (filter != H5Z_FILTER_SHUFFLE && filter != H5Z_FILTER_DEFLATE &&
-        filter != H5Z_FILTER_FLETCHER32) {
-      throw_damaged(path, "uses a filter that fabric databases do not have");
-    }
-  }
-  if (filters < 0 || filters > kFiltersLimit) {
-    throw_damaged(path, "has damaged filters");
-  }
-}
-
-// Whether every filter is one of ours, and all data lies chunk by chunk in this very file.
-void check_storage(Id dataset, const std::string& path, const DatasetSource::Info& info,
-                   std::uint64_t file_bytes) {
-  const Handle properties(H5Dget_create_plist(dataset));
-  if (properties.id() < 0 || H5Pget_layout(properties.id()) != H5D_CHUNKED ||
-      H5Pget_external_count(properties.id()) != 0) {
-    throw_damaged(path, "is not stored in chunks inside the file");
-  }
-  check_filters(properties.id(), path);
-  const std::uint64_t chunks = check_chunks(properties.id(), path, info, file_bytes);
-  const Handle space(H5Dget_space(dataset));
-  hsize_t stored = 0;
-  if (H5Dget_num_chunks(dataset, space.id(), &stored) < 0 || stored != chunks) {
-    throw_damaged(path, "has " + std::to_string(stored) + " chunks where its shape needs " +
-                            std::to_string(chunks));
-  }
-}
 
 // The library's way to leave a file in the memory where it is: these hand out that memory and give
 // nothing back.
@@ -293,6 +229,7 @@ void Reader::admit(const std::string& path, const Info& info) {
 void Reader::read(const std::string& path, const Info& info, std::span<std::byte> out) {
   CHECK_EQ(info.bytes, out.size());
   const Handle dataset = open(path);
+  check_chunk_lengths(dataset.id(), path, info);
   const Handle type = type_of(info.element, info.element_bytes);
   if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, out.data()) < 0) {
     throw_damaged(path, "is damaged: its checksum or its compression does not hold");

@@ -28,7 +28,8 @@ ORDER = {"coordinator": ["queue", "journal", "versions", "scheduler", "services"
 
 # Third-party header -> the files that alone include it.
 BEHIND = {
-    r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_reader.cpp", "storage/h5_types.cpp"},
+    r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_chunks.cpp", "storage/h5_reader.cpp",
+                           "storage/h5_types.cpp"},
     r"embree3/.*": {"transport/scene.cpp", "render/triangle_scene.cpp"},
     r"(OpenEXR/)?Imf.*": {"render/image.cpp", "render/files/exr_parser.cpp"},
     r"png\.h": {"render/png.cpp", "render/files/png_parser.cpp"},

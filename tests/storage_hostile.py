@@ -187,6 +187,28 @@ def chunk_that_inflates_beyond_itself(file):
 
 
 @way
+def chunk_without_its_filters(file):
+    """Stored as if nothing had been done to it, and shorter than the chunk."""
+    made = replace(file, POINTS, None, shape=(5, 3), dtype="<f4", chunks=(5, 3), shuffle=True,
+                   compression="gzip", fletcher32=True)
+    made.id.write_direct_chunk((0, 0), bytes(17), filter_mask=0xFF)
+
+
+@way
+def chunk_without_its_deflation(file):
+    made = replace(file, POINTS, None, shape=(5, 3), dtype="<f4", chunks=(5, 3),
+                   compression="gzip")
+    made.id.write_direct_chunk((0, 0), bytes(61), filter_mask=0x1)
+
+
+@way
+def chunk_longer_than_its_data(file):
+    made = replace(file, POINTS, None, shape=(5, 3), dtype="<f4", chunks=(5, 3),
+                   compression="gzip")
+    made.id.write_direct_chunk((0, 0), zlib.compress(bytes(60)) + bytes(200))
+
+
+@way
 def type_wider(file):
     replace(file, BASIS, file[BASIS][...].astype("<f8"), chunks=file[BASIS].shape)
 
