@@ -1,7 +1,9 @@
 #include "fabric/fibre_pairs.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include <glm/geometric.hpp>
@@ -17,15 +19,48 @@ constexpr int kMostCells = 512;
 constexpr float kRounding = 1.0001F;  // reaches are compared in single precision first
 constexpr double kShortest2 = 1e-24;  // squared length below which a piece is a point
 
+// What the search reads of pieces, side by side by cell.
+struct Members {
+  std::vector<float> x_mm;  // of the middle
+  std::vector<float> y_mm;
+  std::vector<float> z_mm;
+  std::vector<float> reach_mm;
+  std::vector<std::uint32_t> piece;
+
+  void resize(std::size_t count) {
+    for (std::vector<float>* const values : {&x_mm, &y_mm, &z_mm, &reach_mm}) {
+      values->resize(count);
+    }
+    piece.resize(count);
+  }
+  void set(std::uint32_t m, std::uint32_t of_piece, glm::vec3 middle, float reach) {
+    x_mm[m] = middle.x;
+    y_mm[m] = middle.y;
+    z_mm[m] = middle.z;
+    reach_mm[m] = reach;
+    piece[m] = of_piece;
+  }
+  [[nodiscard]] glm::vec3 middle_mm(std::uint32_t m) const { return {x_mm[m], y_mm[m], z_mm[m]}; }
+
+  // Whether each from `first` to before `end` may reach who stands at `at`: one byte each.
+  void measure(glm::vec3 at, float own_reach, std::uint32_t first, std::uint32_t end,
+               std::uint8_t* near) const {
+    const float* const xs = x_mm.data() + first;
+    const float* const ys = y_mm.data() + first;
+    const float* const zs = z_mm.data() + first;
+    const float* const reaches = reach_mm.data() + first;
+    for (std::uint32_t m = 0; m < end - first; ++m) {
+      const float x = xs[m] - at.x;
+      const float y = ys[m] - at.y;
+      const float z = zs[m] - at.z;
+      const float reach = (reaches[m] + own_reach) * kRounding;
+      near[m] = x * x + y * y + z * z < reach * reach ? 1 : 0;
+    }
+  }
+};
+
 // Pieces by the cell of their midpoint, wrapped into the tile, in counting order.
 class PieceGrid {
-  // What the search reads of a piece, side by side by cell.
-  struct Member {
-    glm::vec3 middle_mm;
-    float reach_mm = 0;
-    std::uint32_t piece = 0;
-  };
-
  public:
   PieceGrid(const FibreBody& body, double margin_mm) : body_(body), margin_mm_(margin_mm) {
     measure();
@@ -40,19 +75,17 @@ class PieceGrid {
     members_.resize(count);
     std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
     for (std::uint32_t k = 0; k < count; ++k) {
-      members_[next[cell_of[k]]++] = {glm::vec3(wrapped_[k]), static_cast<float>(reaches_[k]), k};
+      members_.set(next[cell_of[k]]++, k, glm::vec3(wrapped_[k]), static_cast<float>(reaches_[k]));
     }
   }
 
-  void collect(std::uint32_t u, std::vector<FibrePair>& pairs) const {
-    const glm::ivec3 home = cell_at(wrapped_[u]);
-    for (int dx = -around_.x; dx <= around_.x; ++dx) {
-      for (int dy = -around_.y; dy <= around_.y; ++dy) {
-        const glm::ivec2 wrap = {floor_divide(home.x + dx, cells_.x),
-                                 floor_divide(home.y + dy, cells_.y)};
-        const glm::ivec2 at = {home.x + dx - wrap.x * cells_.x, home.y + dy - wrap.y * cells_.y};
-        for (int z = std::max(0, home.z - 1); z <= std::min(cells_.z - 1, home.z + 1); ++z) {
-          collect_from(u, {at.x, at.y, z}, wrap, pairs);
+  // Of the pairs of cells that may hold pairs of pieces one half is visited: the other half are the
+  // same pairs from their other end.
+  void collect(std::vector<FibrePair>& pairs) {
+    for (int z = 0; z < cells_.z; ++z) {
+      for (int y = 0; y < cells_.y; ++y) {
+        for (int x = 0; x < cells_.x; ++x) {
+          collect_round({x, y, z}, pairs);
         }
       }
     }
@@ -103,37 +136,72 @@ class PieceGrid {
     return static_cast<std::uint32_t>((cell.z * cells_.y + cell.y) * cells_.x + cell.x);
   }
 
-  // `wrap` is how many tiles away the cell's copy lies, between wrapped midpoints.
-  void collect_from(std::uint32_t u, glm::ivec3 cell, glm::ivec2 wrap,
-                    std::vector<FibrePair>& pairs) const {
-    const std::uint32_t c = index(cell);
-    const glm::vec3 from(wrapped_[u] -
-                         glm::dvec3(wrap.x * body_.size_mm.x, wrap.y * body_.size_mm.y, 0));
-    const auto own_reach = static_cast<float>(reaches_[u]);
-    // The same pair is found from the other side: only pieces from u on, which a cell has in order.
-    std::uint32_t m = starts_[c];
-    while (m < starts_[c + 1] && members_[m].piece < u) {
-      ++m;
+  // The pairs of `home` with itself and with the cells behind it, by z, then y, then x.
+  void collect_round(glm::ivec3 home, std::vector<FibrePair>& pairs) {
+    const std::uint32_t c = index(home);
+    for (std::uint32_t m = starts_[c]; m < starts_[c + 1]; ++m) {
+      collect_from(m, m + 1, starts_[c + 1], {0, 0}, pairs);
     }
-    for (; m < starts_[c + 1]; ++m) {
-      const glm::vec3 step = members_[m].middle_mm - from;
-      const float reach = (members_[m].reach_mm + own_reach) * kRounding;
-      if (glm::dot(step, step) >= reach * reach) {
-        continue;
+    collect_row(home, home, {home.x + 1, home.x + around_.x}, pairs);
+    for (int dy = 1; dy <= around_.y; ++dy) {
+      collect_row(home, {home.x, home.y + dy, home.z}, {home.x - around_.x, home.x + around_.x},
+                  pairs);
+    }
+    for (int dy = -around_.y; home.z + 1 < cells_.z && dy <= around_.y; ++dy) {
+      collect_row(home, {home.x, home.y + dy, home.z + 1}, {home.x - around_.x, home.x + around_.x},
+                  pairs);
+    }
+  }
+
+  // The pairs of `home` with cells first to last of a row of cells; those beyond the tile's borders
+  // are copies. Members of neighbours in a row lie side by side.
+  void collect_row(glm::ivec3 home, glm::ivec3 row, glm::ivec2 first_and_last,
+                   std::vector<FibrePair>& pairs) {
+    const std::uint32_t c = index(home);
+    const int wrap_y = floor_divide(row.y, cells_.y);
+    const int y = row.y - wrap_y * cells_.y;
+    for (int x = first_and_last.x; x <= first_and_last.y;) {
+      const int wrap_x = floor_divide(x, cells_.x);
+      const int last = std::min(first_and_last.y, (wrap_x + 1) * cells_.x - 1);
+      const std::uint32_t first_member = starts_[index({x - wrap_x * cells_.x, y, row.z})];
+      const std::uint32_t end = starts_[index({last - wrap_x * cells_.x, y, row.z}) + 1];
+      for (std::uint32_t m = starts_[c]; m < starts_[c + 1]; ++m) {
+        collect_from(m, first_member, end, {wrap_x, wrap_y}, pairs);
       }
-      const std::uint32_t v = members_[m].piece;
-      if (v == u && (wrap.x < 0 || (wrap.x == 0 && wrap.y <= 0))) {
-        continue;
+      x = last + 1;
+    }
+  }
+
+  // The pairs of one member with those from `first` to before `end`, whose cells' copy lies `wrap`
+  // tiles away.
+  void collect_from(std::uint32_t member, std::uint32_t first, std::uint32_t end, glm::ivec2 wrap,
+                    std::vector<FibrePair>& pairs) {
+    const glm::vec3 at =
+        members_.middle_mm(member) - glm::vec3(static_cast<float>(wrap.x * body_.size_mm.x),
+                                               static_cast<float>(wrap.y * body_.size_mm.y), 0);
+    near_.resize(std::max<std::size_t>(near_.size(), end - first + sizeof(std::uint64_t)));
+    members_.measure(at, members_.reach_mm[member], first, end, near_.data());
+    std::fill_n(near_.begin() + (end - first), sizeof(std::uint64_t), std::uint8_t{0});
+    for (std::uint32_t m = first; m < end; m += sizeof(std::uint64_t)) {
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, near_.data() + (m - first), sizeof eight);
+      for (; eight != 0; eight &= eight - 1) {
+        const auto byte = static_cast<std::uint32_t>(std::countr_zero(eight)) / 8;
+        keep_if_close(members_.piece[member], members_.piece[m + byte], wrap, pairs);
       }
-      const FibrePair pair{u, v, wrap + tiles_[u] - tiles_[v]};
-      if (same_fibre(pair)) {
-        continue;
-      }
-      const double near = body_.pieces[u].radius_mm + body_.pieces[v].radius_mm + margin_mm_;
-      const glm::dvec3 gap = approach_of(body_, pair).gap_mm;
-      if (glm::dot(gap, gap) < near * near) {
-        pairs.push_back(pair);
-      }
+    }
+  }
+
+  void keep_if_close(std::uint32_t u, std::uint32_t v, glm::ivec2 wrap,
+                     std::vector<FibrePair>& pairs) const {
+    const FibrePair pair{u, v, wrap + tiles_[u] - tiles_[v]};
+    if (same_fibre(pair)) {
+      return;
+    }
+    const double near = body_.pieces[u].radius_mm + body_.pieces[v].radius_mm + margin_mm_;
+    const glm::dvec3 gap = approach_of(body_, pair).gap_mm;
+    if (glm::dot(gap, gap) < near * near) {
+      pairs.push_back(pair);
     }
   }
 
@@ -162,7 +230,8 @@ class PieceGrid {
   std::vector<glm::dvec3> wrapped_;  // [piece]: its midpoint, moved into the first tile
   std::vector<double> reaches_;      // [piece]: from its midpoint, half the margin included
   std::vector<std::uint32_t> starts_;
-  std::vector<Member> members_;
+  Members members_;
+  std::vector<std::uint8_t> near_;  // scratch
 };
 
 }  // namespace
@@ -241,10 +310,7 @@ std::vector<FibrePair> close_pairs(const FibreBody& body, double margin_mm) {
   if (body.pieces.empty()) {
     return pairs;
   }
-  const PieceGrid grid(body, margin_mm);
-  for (std::uint32_t u = 0; u < body.pieces.size(); ++u) {
-    grid.collect(u, pairs);
-  }
+  PieceGrid(body, margin_mm).collect(pairs);
   return pairs;
 }
 

@@ -15,8 +15,11 @@ namespace {
 
 constexpr std::uint32_t kIterations = 60;
 constexpr std::uint32_t kIterationsPerPairList = 4;
-// Of pairs on the list, in the thinnest radius: what fibres move until the next list is made.
+// Of pairs on the list, in the thinnest radius: what fibres move until the next list is made. It is
+// made when more than a share of the nodes may have used up half of it with one another.
 constexpr double kListMargin = 0.7;
+constexpr double kListWorn = 0.25;  // of the margin
+constexpr double kWornShare = 0.002;
 constexpr double kMostMove = 0.3;  // of a node in one iteration, in its radius
 constexpr double kPush = 1.4;      // of the mean correction of a node's contacts
 // Fades from the first iteration to the last, so that contacts have the last word.
@@ -50,8 +53,9 @@ class Untangling {
 
   void run() {
     for (std::uint32_t n = 0; n < kIterations; ++n) {
-      if (n % kIterationsPerPairList == 0) {
+      if (n % kIterationsPerPairList == 0 && is_list_worn()) {
         pairs_ = close_pairs(body_, kListMargin * thinnest_mm_);
+        listed_mm_ = body_.nodes_mm;
       }
       push_apart();
       settle(faded(kSmoothFirst, kSmoothLast, n), faded(kPullFirst, 0, n));
@@ -69,6 +73,19 @@ class Untangling {
   }
 
  private:
+  [[nodiscard]] bool is_list_worn() const {
+    if (listed_mm_.empty()) {
+      return true;
+    }
+    const double most = kListWorn * kListMargin * thinnest_mm_;
+    std::size_t worn = 0;
+    for (std::size_t n = 0; n < listed_mm_.size(); ++n) {
+      const glm::dvec3 step = body_.nodes_mm[n] - listed_mm_[n];
+      worn += glm::dot(step, step) > most * most ? 1 : 0;
+    }
+    return static_cast<double>(worn) > kWornShare * static_cast<double>(listed_mm_.size());
+  }
+
   void push_apart() {
     corrections_mm_.assign(body_.nodes_mm.size(), glm::dvec3(0));
     weights_.assign(body_.nodes_mm.size(), 0);
@@ -136,6 +153,7 @@ class Untangling {
   std::vector<double> radii_mm_;  // [node]
   double thinnest_mm_ = 0;
   std::vector<FibrePair> pairs_;
+  std::vector<glm::dvec3> listed_mm_;  // the nodes when the list was made
   std::vector<glm::dvec3> corrections_mm_;
   std::vector<double> weights_;
   std::vector<glm::dvec3> displacements_mm_;

@@ -5,6 +5,7 @@
 
 #include "core/digest.h"
 #include "core/random.h"
+#include "fabric/untangle.h"
 #include "shading/fibre_bcsdf.h"
 #include "transport/float_mode.h"
 #include "transport/pca.h"
@@ -38,8 +39,8 @@ void probe_libm(core::Hasher& hasher) {
   }
 }
 
-// A few crossed fibres.
-fabric::Tile probe_tile() {
+// A few crossed fibres, `lift_mm` above one another.
+fabric::Tile probe_tile(float lift_mm) {
   fabric::Tile tile;
   tile.size_mm = {1, 1};
   tile.z_min_mm = -0.1f;
@@ -49,7 +50,7 @@ fabric::Tile probe_tile() {
   tile.threads = {{0, fabric::Role::kExplicit, 0}};
   for (std::uint32_t i = 0; i < 8; ++i) {
     const float across = (static_cast<float>(i) + 0.37f) / 8;
-    const float z = i % 2 == 0 ? 0.0f : 0.2f;
+    const float z = i % 2 == 0 ? 0.0f : lift_mm;
     for (const float along : {0.0f, 0.31f, 0.64f, 1.0f}) {
       const float bend = along == 0.31f || along == 0.64f ? 0.03f : 0.0f;
       tile.points_mm.push_back(i % 2 == 0 ? glm::vec3{along, across + bend, z}
@@ -59,6 +60,17 @@ fabric::Tile probe_tile() {
   }
   fabric::index_segments(tile);
   return tile;
+}
+
+// Fibres that lie inside one another are moved apart.
+void probe_geometry(core::Hasher& hasher) {
+  fabric::Tile tile = probe_tile(0.03f);
+  fabric::untangle(tile);
+  for (const glm::vec3& point : tile.points_mm) {
+    for (int axis = 0; axis < 3; ++axis) {
+      add(hasher, point[axis]);
+    }
+  }
 }
 
 void probe_rays(core::Hasher& hasher, const transport::Scene& scene) {
@@ -121,7 +133,8 @@ core::Digest numerics_fingerprint() {
   hasher.field("weft numerics 1");
   probe_libm<float>(hasher);
   probe_libm<double>(hasher);
-  const fabric::Tile tile = probe_tile();
+  probe_geometry(hasher);
+  const fabric::Tile tile = probe_tile(0.2f);
   const transport::Scene scene(tile);
   probe_rays(hasher, scene);
   probe_paths(hasher, scene);
