@@ -58,40 +58,6 @@ std::uint32_t some_segment(std::uint64_t i) {
   return core::Random(1, 0, i).below(satin().segment_count());
 }
 
-void scene_build(benchmark::State& state) {
-  static_cast<void>(satin());
-  for (auto unused : state) {
-    const transport::Scene built(satin());
-    benchmark::DoNotOptimize(&built);
-  }
-  state.counters["segments"] = satin().segment_count();
-}
-BENCHMARK(scene_build)->Unit(benchmark::kMillisecond);
-
-template <bool kClosest>
-void rays(benchmark::State& state) {
-  static_cast<void>(scene());
-  std::uint32_t i = 0;
-  std::uint64_t hits = 0;
-  for (auto unused : state) {
-    const std::uint32_t segment = some_segment(i / 256);
-    core::Random random(2, i++);
-    const float u_z = random.uniform();
-    const glm::vec3 direction = transport::uniform_direction(u_z, random.uniform());
-    const glm::vec3 origin = satin().wrapped_midpoint(segment);
-    const transport::StrandCopy own = scene().own_copy(segment);
-    if constexpr (kClosest) {
-      hits += scene().closest(origin, direction, kFar, own) ? 1 : 0;
-    } else {
-      hits += scene().occluded(origin, direction, kFar, own) ? 1 : 0;
-    }
-  }
-  state.SetItemsProcessed(static_cast<std::int64_t>(i));
-  state.counters["hit_share"] = static_cast<double>(hits) / i;
-}
-BENCHMARK(rays<true>)->Name("rays_closest");
-BENCHMARK(rays<false>)->Name("rays_occluded");
-
 void visibility_rays(benchmark::State& state) {
   static_cast<void>(scene());
   std::uint64_t i = 0;

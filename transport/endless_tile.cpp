@@ -19,18 +19,6 @@ constexpr std::uint64_t kMaxCapsules = std::uint64_t{1} << 25;
 
 }  // namespace
 
-glm::vec3 off_axis(glm::vec3 direction) {
-  constexpr float kTilt = 4e-4f;
-  if (direction.y == 0 && (direction.x == 0 || direction.z == 0)) {
-    direction.y = kTilt;
-  } else if (direction.x == 0 && direction.z == 0) {
-    direction.x = kTilt;
-  } else {
-    return direction;
-  }
-  return glm::normalize(direction);
-}
-
 // Chooses how many tiles make a block: one that a ray crosses in few legs.
 EndlessTile::EndlessTile(const fabric::Tile& tile_in) : tile(tile_in) {
   float max_radius = 0;
@@ -64,24 +52,6 @@ EndlessTile::EndlessTile(const fabric::Tile& tile_in) : tile(tile_in) {
   }
   copies = {static_cast<int>(needed[0]), static_cast<int>(needed[1])};
   block_size_mm = {needed[0] * tile.size_mm.x, needed[1] * tile.size_mm.y};
-}
-
-EndlessTile::Span EndlessTile::inside_slab(double z, double direction_z) const {
-  const double low = static_cast<double>(z_min_mm - overlap_mm);
-  const double high = static_cast<double>(z_max_mm + overlap_mm);
-  constexpr double kForever = std::numeric_limits<double>::infinity();
-  if (direction_z == 0) {
-    return z < low || z > high ? Span{0, -kForever} : Span{-kForever, kForever};
-  }
-  const double to_low = (low - z) / direction_z;
-  const double to_high = (high - z) / direction_z;
-  return {std::min(to_low, to_high), std::max(to_low, to_high)};
-}
-
-glm::ivec2 EndlessTile::tile_of(glm::vec3 point) const {
-  const glm::dvec2 size(tile.size_mm);
-  return {static_cast<int>(std::floor(static_cast<double>(point.x) / size.x)),
-          static_cast<int>(std::floor(static_cast<double>(point.y) / size.y))};
 }
 
 glm::ivec2 EndlessTile::tile_of_midpoint(std::uint32_t segment) const {

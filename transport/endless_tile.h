@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -43,47 +44,66 @@ struct EndlessTile {
   [[nodiscard]] Span inside_slab(double z, double direction_z) const;
 
   // Cuts a ray into legs that stay where the nine blocks are complete, and calls
-  // visit(origin in the central block, direction, length, tiles from the ray's own tile to the
+  // visit(origin in the central block, length, tiles from the ray's own tile to the
   // central block, distance so far) for each until it returns true, the ray leaves the cloth or
   // kMaxLegs are done.
   template <class Visit>
   void walk(glm::vec3 origin, glm::vec3 direction, float t_max, const Visit& visit) const;
 };
 
-// A direction for Embree: its round curves miss their start cap when a ray runs along them within
-// 2e-4 (measured with 3.13.5). Rays along a coordinate axis, the only ones that meet this in
-// practice, are turned in the plane of the cloth.
-[[nodiscard]] glm::vec3 off_axis(glm::vec3 direction);
+inline EndlessTile::Span EndlessTile::inside_slab(double z, double direction_z) const {
+  const double low = static_cast<double>(z_min_mm - overlap_mm);
+  const double high = static_cast<double>(z_max_mm + overlap_mm);
+  constexpr double kForever = std::numeric_limits<double>::infinity();
+  if (direction_z == 0) {
+    return z < low || z > high ? Span{0, -kForever} : Span{-kForever, kForever};
+  }
+  const double to_low = (low - z) / direction_z;
+  const double to_high = (high - z) / direction_z;
+  return {std::min(to_low, to_high), std::max(to_low, to_high)};
+}
+
+inline glm::ivec2 EndlessTile::tile_of(glm::vec3 point) const {
+  glm::ivec2 found{0, 0};
+  for (int axis = 0; axis < 2; ++axis) {
+    // Most points are in the tile at home, and know it without a division.
+    if (!(point[axis] >= 0 && point[axis] < tile.size_mm[axis])) {
+      found[axis] = static_cast<int>(
+          std::floor(static_cast<double>(point[axis]) / static_cast<double>(tile.size_mm[axis])));
+    }
+  }
+  return found;
+}
 
 template <class Visit>
 void EndlessTile::walk(glm::vec3 origin, glm::vec3 direction, float t_max,
                        const Visit& visit) const {
   const Span slab = inside_slab(origin.z, direction.z);
   const double t_start = std::max(0.0, slab.enter);
-  const glm::dvec3 start = glm::dvec3(origin) + t_start * glm::dvec3(direction);
-  const glm::vec3 along = off_axis(direction);
-  const double t_end = std::min(static_cast<double>(t_max),
-                                t_start + inside_slab(start.z, static_cast<double>(along.z)).leave);
+  const glm::dvec3 along(direction);
+  const glm::dvec3 start = glm::dvec3(origin) + t_start * along;
+  const double t_end = std::min(static_cast<double>(t_max), slab.leave);
   const glm::ivec2 own = tile_of(origin);
   double t = t_start;
   for (int leg = 0; leg < kMaxLegs && t < t_end; ++leg) {
     double length = t_end - t;
-    const glm::dvec3 at = start + (t - t_start) * glm::dvec3(along);
+    const glm::dvec3 at = start + (t - t_start) * along;
     glm::vec3 local(at);
-    glm::ivec2 shift{0, 0};
+    glm::ivec2 shift = -own;
     for (int axis = 0; axis < 2; ++axis) {
-      const double block_index = std::floor(at[axis] / block_size_mm[axis]);
-      local[axis] = static_cast<float>(at[axis] - block_index * block_size_mm[axis]);
-      shift[axis] = static_cast<int>(block_index) * copies[axis] - own[axis];
-      if (along[axis] != 0) {
-        const double border = along[axis] > 0
+      if (!(at[axis] >= 0 && at[axis] < block_size_mm[axis])) {
+        const double block_index = std::floor(at[axis] / block_size_mm[axis]);
+        local[axis] = static_cast<float>(at[axis] - block_index * block_size_mm[axis]);
+        shift[axis] += static_cast<int>(block_index) * copies[axis];
+      }
+      if (direction[axis] != 0) {
+        const double border = direction[axis] > 0
                                   ? 2 * block_size_mm[axis] - static_cast<double>(overhang_mm)
                                   : static_cast<double>(overhang_mm) - block_size_mm[axis];
-        length = std::min(
-            length, (border - static_cast<double>(local[axis])) / static_cast<double>(along[axis]));
+        length = std::min(length, (border - static_cast<double>(local[axis])) / along[axis]);
       }
     }
-    if (visit(local, along, static_cast<float>(length), shift, t)) {
+    if (visit(local, static_cast<float>(length), shift, t)) {
       return;
     }
     t += length < t_end - t ? length - static_cast<double>(overlap_mm) : length;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -18,17 +19,19 @@ struct Hit {
   StrandCopy copy;  // relative to the ray's own tile, the one holding its origin at (0, 0)
 };
 
-// The capsules of one tile, endlessly repeated in x and y, as an Embree scene. Rays that start
-// inside a capsule do not see that capsule's exit: only entries count in closest() (transport);
-// occluded() counts any overlap at the start as blocked (visibility). Immutable: any thread may
-// call. Results do not depend on the caller's floating-point mode, and shifting a ray by whole
-// tiles changes them only by the rounding of its origin.
+// The capsules of one tile, endlessly repeated in x and y, in a hierarchy of their own. Rays that
+// start inside a capsule do not see that capsule's exit: only entries count in closest()
+// (transport); occluded() counts any overlap at the start as blocked (visibility). Immutable: any
+// thread may call. Results do not depend on the caller's floating-point mode, and shifting a ray by
+// whole tiles changes them only by the rounding of its origin.
 class Scene {
  public:
   // Keeps a reference to `tile`, which must outlive the scene. Throws core::Error(kInvalidArgument)
-  // when the tile is empty or so much smaller than its fibres that its copies fill the memory, and
-  // kResourceExhausted when Embree cannot build it.
+  // when the tile is empty or so much smaller than its fibres that its copies fill the memory. Rays
+  // are traced by the wide kernel where wide_is_available().
   explicit Scene(const fabric::Tile& tile);
+  // Says which kernel: both give the same bits. REQUIRES: not wide, or a processor that has it.
+  Scene(const fabric::Tile& tile, bool wide);
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
@@ -36,6 +39,8 @@ class Scene {
   Scene& operator=(Scene&&) = delete;
 
   [[nodiscard]] const fabric::Tile& tile() const;
+  // Memory that the hierarchy takes, the tile not included.
+  [[nodiscard]] std::size_t size_bytes() const;
 
   // First fibre entered by the ray from `origin_mm` (any point of endless cloth) along unit
   // `direction` before `t_max_mm`; fibres equal to `ignored` (relative to the ray's own tile) are

@@ -130,7 +130,7 @@ void probe_algebra(core::Hasher& hasher) {
 core::Digest numerics_fingerprint() {
   const transport::FlushDenormals flush;  // as bakers do
   core::Hasher hasher;
-  hasher.field("weft numerics 1");
+  hasher.field("weft numerics 2");
   probe_libm<float>(hasher);
   probe_libm<double>(hasher);
   probe_geometry(hasher);
