@@ -29,7 +29,11 @@ struct Row {
   float share_r = 0;  // probability of the reflection lobe
   TruncatedTails r;
   TruncatedTails tt;
-  float plain_r = 0;  // adjoint moments, see lobe_normalisation.h
+};
+
+// Adjoint moments of both lobes, see lobe_normalisation.h.
+struct Moments {
+  float plain_r = 0;
   float schlick_r = 0;
   float plain_tt = 0;
   float schlick_tt = 0;
@@ -84,6 +88,24 @@ glm::vec3 direction(float sin_theta, float cos_theta, float phi, glm::vec2 axis)
   return {sin_theta, c * axis.x - s * axis.y, c * axis.y + s * axis.x};
 }
 
+// The direction of longitude i at phi_o + pi + v, `turn` being (cos v, sin v).
+glm::vec3 turned(const FibreAngle& i, glm::vec2 turn, glm::vec2 axis) {
+  return {i.sin_theta, i.cos_theta * (turn.y * axis.y - turn.x * axis.x),
+          -i.cos_theta * (turn.y * axis.x + turn.x * axis.y)};
+}
+
+float largest(glm::vec3 rgb) { return std::max({rgb.x, rgb.y, rgb.z}); }
+
+// Where in the rows the longitude that is `pole` from the axis lies.
+float row_of(float pole) {
+  return std::sqrt(std::clamp(pole, 0.0f, kHalfPi) * (1 / kHalfPi)) * kRowCells;
+}
+
+struct LobeAlbedos {
+  glm::vec3 r;
+  glm::vec3 tt;
+};
+
 }  // namespace
 
 struct FibreBcsdf::Tables {
@@ -93,12 +115,18 @@ struct FibreBcsdf::Tables {
   bool furnace = false;
   std::vector<glm::vec2> norm;
   std::vector<Row> rows;
+  std::vector<Moments> moments;  // at the rows' angles
   AzimuthTable azimuth;
   FibreLobes lobes;
   float peak_r;   // 1 / (sqrt(2 pi) beta)
   float peak_tt;  // 1 / (sqrt(2 pi) beta)
 
-  [[nodiscard]] Row row(float pole) const;
+  [[nodiscard]] Row row(float at) const;
+  // The adjoint albedos of both lobes.
+  [[nodiscard]] LobeAlbedos albedos(float at) const;
+  // Longitude of a sample of one lobe.
+  [[nodiscard]] FibreAngle sample_angle(const TruncatedTails& cut, bool reflect, float theta_o,
+                                        float u) const;
   // The density that sample() draws from, times cos(theta_i).
   [[nodiscard]] float density_cos(const Row& row, glm::vec2 gaussians, float azimuth_density) const;
 };
@@ -121,6 +149,7 @@ FibreBcsdf::Tables::Tables(const FibreMaterial& m)
   const glm::dvec3 c_r = m.c_r;
   const glm::dvec3 c_tt = m.c_tt;
   rows.resize(kRowCells + 1);
+  moments.resize(kRowCells + 1);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double t = static_cast<double>(i) / kRowCells;
     const double theta = half_pi * (1 - t * t);
@@ -131,10 +160,8 @@ FibreBcsdf::Tables::Tables(const FibreMaterial& m)
                                      c_tt * (1.0 - c_r) * (tt.plain - tt.schlick));
     row_i.r = tails(theta, beta_r);
     row_i.tt = tails(theta, beta_tt);
-    row_i.plain_r = static_cast<float>(r.plain);
-    row_i.schlick_r = static_cast<float>(r.schlick);
-    row_i.plain_tt = static_cast<float>(tt.plain);
-    row_i.schlick_tt = static_cast<float>(tt.schlick);
+    moments[i] = {static_cast<float>(r.plain), static_cast<float>(r.schlick),
+                  static_cast<float>(tt.plain), static_cast<float>(tt.schlick)};
   }
   lobes.c_r = m.c_r;
   lobes.c_tt = m.c_tt;
@@ -145,19 +172,35 @@ FibreBcsdf::Tables::Tables(const FibreMaterial& m)
   lobes.table = norm.data();
 }
 
-Row FibreBcsdf::Tables::row(float pole) const {
-  const float t = std::sqrt(std::clamp(pole, 0.0f, kHalfPi) * (1 / kHalfPi)) * kRowCells;
-  const int i = std::min(static_cast<int>(t), kRowCells - 1);
-  const float f = t - static_cast<float>(i);
+Row FibreBcsdf::Tables::row(float at) const {
+  const int i = std::min(static_cast<int>(at), kRowCells - 1);
+  const float f = at - static_cast<float>(i);
   const Row& a = rows[static_cast<std::size_t>(i)];
   const Row& b = rows[static_cast<std::size_t>(i) + 1];
-  return {mix_floats(a.share_r, b.share_r, f),
-          mix_tails(a.r, b.r, f),
-          mix_tails(a.tt, b.tt, f),
-          mix_floats(a.plain_r, b.plain_r, f),
-          mix_floats(a.schlick_r, b.schlick_r, f),
-          mix_floats(a.plain_tt, b.plain_tt, f),
-          mix_floats(a.schlick_tt, b.schlick_tt, f)};
+  return {mix_floats(a.share_r, b.share_r, f), mix_tails(a.r, b.r, f), mix_tails(a.tt, b.tt, f)};
+}
+
+LobeAlbedos FibreBcsdf::Tables::albedos(float at) const {
+  const int i = std::min(static_cast<int>(at), kRowCells - 1);
+  const float f = at - static_cast<float>(i);
+  const Moments& a = moments[static_cast<std::size_t>(i)];
+  const Moments& b = moments[static_cast<std::size_t>(i) + 1];
+  const float plain_tt = mix_floats(a.plain_tt, b.plain_tt, f);
+  const float schlick_tt = mix_floats(a.schlick_tt, b.schlick_tt, f);
+  const glm::vec3 passed = glm::vec3(1) - material.c_r;
+  return {material.c_r * mix_floats(a.plain_r, b.plain_r, f) +
+              passed * mix_floats(a.schlick_r, b.schlick_r, f),
+          material.c_tt * passed * (plain_tt - schlick_tt)};
+}
+
+FibreAngle FibreBcsdf::Tables::sample_angle(const TruncatedTails& cut, bool reflect, float theta_o,
+                                            float u) const {
+  FibreAngle i;
+  i.theta = sample_theta(cut, reflect ? material.beta_r : material.beta_tt, theta_o, u);
+  i.pole = kHalfPi - std::abs(i.theta);
+  i.sin_theta = sin_quarter(i.theta);
+  i.cos_theta = std::max(sin_quarter(i.pole), kCosineFloor);
+  return i;
 }
 
 float FibreBcsdf::Tables::density_cos(const Row& at, glm::vec2 gaussians,
@@ -208,14 +251,9 @@ BcsdfSample FibreBcsdf::sample(glm::vec3 omega_o, float u_lobe, float u_theta, f
     result.pdf = c * kFurnaceValue;
     return result;
   }
-  const Row row = t.row(o.pole);
+  const Row row = t.row(row_of(o.pole));
   const bool reflect = u_lobe < row.share_r;
-  FibreAngle i;
-  i.theta = sample_theta(reflect ? row.r : row.tt, reflect ? t.material.beta_r : t.material.beta_tt,
-                         o.theta, u_theta);
-  i.pole = kHalfPi - std::abs(i.theta);
-  i.sin_theta = sin_quarter(i.theta);
-  i.cos_theta = std::max(sin_quarter(i.pole), kCosineFloor);
+  const FibreAngle i = t.sample_angle(reflect ? row.r : row.tt, reflect, o.theta, u_theta);
   float v;  // phi_i - phi_o - pi
   float azimuth_density;
   if (reflect) {
@@ -227,8 +265,7 @@ BcsdfSample FibreBcsdf::sample(glm::vec3 omega_o, float u_lobe, float u_theta, f
     azimuth_density = drawn.density;
   }
   const glm::vec2 turn = cos_sin_half(v);
-  result.omega_i = {i.sin_theta, i.cos_theta * (turn.y * axis.y - turn.x * axis.x),
-                    -i.cos_theta * (turn.y * axis.x + turn.x * axis.y)};
+  result.omega_i = turned(i, turn, axis);
   const glm::vec2 gaussians = lobe_gaussians(t.lobes, i.theta, o.theta);
   const LobePair s = bcsdf_lobes(t.lobes, i, gaussians, -turn.x);
   const float density = t.density_cos(row, gaussians, azimuth_density);
@@ -238,6 +275,50 @@ BcsdfSample FibreBcsdf::sample(glm::vec3 omega_o, float u_lobe, float u_theta, f
   result.pdf = density / i.cos_theta;
   result.weight = (s.r + s.tt) * (i.cos_theta / result.pdf);
   return result;
+}
+
+LobeOdds FibreBcsdf::odds(glm::vec3 omega_o, glm::vec3 throughput) const {
+  LobeOdds odds;
+  if (tables_->furnace) {
+    odds.tt = largest(throughput);
+    return odds;
+  }
+  odds.o = fibre_angle(omega_o);
+  odds.row = row_of(odds.o.pole);
+  const LobeAlbedos kept = tables_->albedos(odds.row);
+  odds.r = largest(throughput * kept.r);
+  odds.tt = largest(throughput * kept.tt);
+  return odds;
+}
+
+BcsdfStep FibreBcsdf::scatter(glm::vec3 omega_o, const LobeOdds& odds, glm::vec3 throughput,
+                              glm::vec3 u) const {
+  if (!(u.x < odds.r + odds.tt)) {
+    return {};
+  }
+  const Tables& t = *tables_;
+  if (t.furnace) {
+    return {sample(omega_o, u.x / odds.tt, u.y, u.z).omega_i, throughput / odds.tt, true};
+  }
+  const bool reflect = u.x < odds.r;
+  const Row row = t.row(odds.row);
+  const TruncatedTails& cut = reflect ? row.r : row.tt;
+  const FibreAngle i = t.sample_angle(cut, reflect, odds.o.theta, u.y);
+  const glm::vec2 axis = azimuth_axis(omega_o, odds.o.cos_theta);
+  const glm::vec2 norm = lobe_norm(t.lobes, i.pole);
+  const glm::vec3 f = fresnel(t.lobes.c_r, i.cos_theta);
+  // S_l cos over its density: the Gaussian cancels, and so does the circle of S_R.
+  const float along = i.cos_theta * i.cos_theta * (1 - cut.low - cut.high);
+  if (reflect) {
+    const float weight = along / (t.peak_r * norm.x * odds.r);
+    return {turned(i, cos_sin_half(kTwoPi * u.z - kPi), axis), throughput * f * weight, true};
+  }
+  const AzimuthTable::Sample drawn = t.azimuth.sample(u.z);
+  const glm::vec2 turn = cos_sin_half(drawn.v);
+  const float around =
+      std::exp(-t.lobes.kappa_tt * (1 - turn.x)) * t.lobes.azimuth_norm / drawn.density;
+  const float weight = along * around / (t.peak_tt * norm.y * odds.tt);
+  return {turned(i, turn, axis), throughput * (glm::vec3(1) - f) * t.lobes.c_tt * weight, true};
 }
 
 float FibreBcsdf::pdf(glm::vec3 omega_i, glm::vec3 omega_o) const {
@@ -254,7 +335,7 @@ float FibreBcsdf::pdf(glm::vec3 omega_i, glm::vec3 omega_o) const {
   const float c = std::sqrt(0.5f * (1 - cos_phi));
   const float v = s < c ? 2 * asin_acute(std::min(s, 0.70710678f))
                         : kPi - 2 * asin_acute(std::min(c, 0.70710678f));
-  return t.density_cos(t.row(o.pole), lobe_gaussians(t.lobes, i.theta, o.theta),
+  return t.density_cos(t.row(row_of(o.pole)), lobe_gaussians(t.lobes, i.theta, o.theta),
                        t.azimuth.density(v)) /
          cos_theta_i;
 }
@@ -263,11 +344,8 @@ glm::vec3 FibreBcsdf::adjoint_albedo(float theta_o) const {
   if (tables_->furnace) {
     return glm::vec3(1);
   }
-  const Row row = tables_->row(kHalfPi - std::abs(theta_o));
-  const glm::vec3 c_r = tables_->material.c_r;
-  const glm::vec3 one(1);
-  return c_r * row.plain_r + (one - c_r) * row.schlick_r +
-         tables_->material.c_tt * (one - c_r) * (row.plain_tt - row.schlick_tt);
+  const LobeAlbedos kept = tables_->albedos(row_of(kHalfPi - std::abs(theta_o)));
+  return kept.r + kept.tt;
 }
 
 }  // namespace weft::shading

@@ -17,6 +17,21 @@ struct BcsdfSample {
   float pdf;          // per solid angle; 0: no sample, the path ends
 };
 
+// How many paths go on from a fibre by either lobe, in the mean.
+struct LobeOdds {
+  float r = 0;
+  float tt = 0;
+  FibreAngle o{};  // of omega_o
+  float row = 0;   // where the tables are read for it
+};
+
+// Where a path goes on, and with what throughput.
+struct BcsdfStep {
+  glm::vec3 omega_i{};     // towards the light, local frame
+  glm::vec3 throughput{};  // that of before times S_l(omega_i, omega_o) cos(theta_i) / pdf_l / odds
+  bool survives = false;   // else the path ends, and the others mean nothing
+};
+
 // S = S_R + S_TT with the tables that evaluate and sample it fast. Directions are unit vectors that
 // point away from the fibre, in any frame whose x axis is the fibre's tangent; omega_i is the light
 // side (S is not reciprocal). Immutable after construction: any thread may call.
@@ -40,6 +55,18 @@ class FibreBcsdf {
   // omega_i given omega_o by three uniform numbers in [0, 1): lobe, theta, phi.
   [[nodiscard]] BcsdfSample sample(glm::vec3 omega_o, float u_lobe, float u_theta,
                                    float u_phi) const;
+  // The odds that leave the largest channel of either lobe at one: that channel of `throughput`
+  // times the lobe's adjoint albedo. With them no channel grows from scattering to scattering, as
+  // it does where sample() picks lobes of coloured or bright fibres by their luminance. They may
+  // sum to more than one.
+  [[nodiscard]] LobeOdds odds(glm::vec3 omega_o, glm::vec3 throughput) const;
+  // Goes on by the reflection lobe where u.x is below odds.r, by the transmission lobe where it is
+  // below odds.r + odds.tt, else ends. For any positive odds, u.x uniform in [0, 1) and their sum
+  // at most one, the expectation of f(omega_i) throughput over what survives is that of before
+  // times the integral of S cos f. Where the sum is larger, that holds for all of u.x, u.x + 1, ...
+  // together. u.y and u.z, in [0, 1), draw theta and phi.
+  [[nodiscard]] BcsdfStep scatter(glm::vec3 omega_o, const LobeOdds& odds, glm::vec3 throughput,
+                                  glm::vec3 u) const;
   // The density that sample() draws from.
   [[nodiscard]] float pdf(glm::vec3 omega_i, glm::vec3 omega_o) const;
   // Integral of S cos(theta_i) over omega_i (maths of W17's ambient term); theta_o in radians.

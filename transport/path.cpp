@@ -46,21 +46,20 @@ bool Path::advance() {
 }
 
 bool Path::scatter(core::Random& random) {
+  shading::LobeOdds odds = bcsdf_->odds(omega_o_, throughput_);
+  if (const float sum = odds.r + odds.tt; sum > 1) {
+    odds.r /= sum;
+    odds.tt = 1 - odds.r;
+  }
   const float u_lobe = random.uniform();
   const float u_theta = random.uniform();
-  const shading::BcsdfSample sample = bcsdf_->sample(omega_o_, u_lobe, u_theta, random.uniform());
-  if (!(sample.pdf > 0)) {
+  const shading::BcsdfStep step =
+      bcsdf_->scatter(omega_o_, odds, throughput_, {u_lobe, u_theta, random.uniform()});
+  if (!step.survives) {
     return false;
   }
-  direction_ = glm::normalize(glm::transpose(frame_) * sample.omega_i);
-  throughput_ *= sample.weight;
-  const float survival = std::min(1.0f, std::max({throughput_.x, throughput_.y, throughput_.z}));
-  if (survival < 1) {
-    if (random.uniform() >= survival) {
-      return false;
-    }
-    throughput_ /= survival;
-  }
+  direction_ = glm::normalize(glm::transpose(frame_) * step.omega_i);
+  throughput_ = step.throughput;
   return true;
 }
 

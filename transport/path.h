@@ -27,9 +27,9 @@ class Path {
   // Goes on to the next fibre; false when the path leaves the cloth.
   bool advance();
 
-  // Samples the direction to go on in and multiplies the throughput by S cos / pdf; then survives
-  // with probability min(1, largest throughput), which keeps the expectation. False when the path
-  // ends here. REQUIRES: advance() returned true.
+  // Samples a lobe and the direction to go on in, and multiplies the throughput by S cos / pdf.
+  // Survives with a probability that leaves the largest channel near one (FibreBcsdf::odds), which
+  // keeps the expectation. False when the path ends here. REQUIRES: advance() returned true.
   bool scatter(core::Random& random);
 
   // S(towards_light, -direction) cos(theta) at the fibre just met, zero when another fibre hides
