@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/random.h"
+#include "tests/transport_images.h"
 #include "tests/transport_tiles.h"
 #include "transport/bake_point.h"
 #include "transport/signed_distance.h"
@@ -21,27 +22,8 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-glm::dvec3 pixel_direction(std::uint32_t pixel, std::uint32_t resolution) {
-  const double theta = row_theta(pixel / resolution, resolution);
-  const double phi = column_phi(pixel % resolution, resolution);
-  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
-}
-
-// Random blobs: what is visible is the union of caps.
-std::vector<std::uint8_t> random_image(std::uint32_t resolution, int caps, std::uint64_t seed) {
-  std::vector<std::uint8_t> bits(resolution * resolution / 8);
-  for (std::uint32_t p = 0; p < resolution * resolution; ++p) {
-    for (int i = 0; i < caps; ++i) {
-      core::Random random(seed, static_cast<std::uint32_t>(i));
-      const glm::dvec3 centre(test::random_direction(random));
-      const double radius = 0.05 + 0.4 * random.uniform_double();
-      if (glm::dot(centre, pixel_direction(p, resolution)) > std::cos(radius)) {
-        bits[p / 8] = static_cast<std::uint8_t>(bits[p / 8] | 1U << (p % 8));
-      }
-    }
-  }
-  return bits;
-}
+using test::pixel_direction;
+using test::random_image;
 
 TEST(TransportSignedDistance, EqualsBruteForce) {
   constexpr std::uint32_t kResolution = 32;

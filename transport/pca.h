@@ -9,11 +9,10 @@
 namespace weft::transport {
 
 // Signed distances are clamped to this before they are analysed (radians): what lies far from an
-// edge is of no use to the sign, and the components are spent on edges instead. One 4/1 satin, 48
-// components of 1000 images, 400 images held out, on which 0.25 was also chosen: 2.07 % of signs
-// wrong at 0.15, 2.04 at 0.25, 2.09 at 0.35, 2.17 at 0.5 and without a clamp. The minimum is flat.
-// The erf of the softest Gaussian that reads them (sharpness 100) is 0.99 there.
-inline constexpr float kDistanceClamp = 0.25f;
+// edge is of no use to the sign, and the components are spent on edges instead. Half the light of
+// the softest Gaussian that reads them alone (sharpness 80) lies within 0.13; its visibility is
+// 0.994 at the clamp. docs/performance.md has what other clamps give.
+inline constexpr float kDistanceClamp = 0.4f;
 
 // Mean and principal components of signed distances. An image is mean + sum of c_i component_i.
 struct DistanceBasis {
@@ -31,7 +30,8 @@ struct DistanceBasis {
                                                  std::uint32_t components, std::uint64_t seed,
                                                  const Checkpoint& checkpoint = {});
 
-// Coefficients [components] of one image of signed distances, clamped as above.
+// Coefficients [components] of one image of signed distances, clamped as above: its orthogonal
+// projection. distance_fit.h finds better ones.
 [[nodiscard]] std::vector<float> project(const DistanceBasis& basis,
                                          std::span<const float> distances);
 

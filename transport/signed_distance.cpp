@@ -211,21 +211,22 @@ void DistanceTransform::nearest_in_rows(std::span<const std::uint8_t> bits,
   }
 }
 
-void DistanceTransform::measure(std::span<const std::uint8_t> bits,
+void DistanceTransform::measure(std::span<const std::uint8_t> bits, std::uint32_t row_step,
                                 std::span<float> distances) const {
   const std::size_t n = resolution_;
   CHECK_EQ(bits.size(), n * n / 8);
-  CHECK_EQ(distances.size(), n * n);
+  CHECK_EQ(distances.size(), (n + row_step - 1) / row_step * n);
   std::vector<float> nearest(n * n);
   nearest_in_rows(bits, nearest);
   const Image image{nearest.data(), rows_apart_.data(), sine_.data(), n, limit_, limit_chord_};
-  for (std::size_t r = 0; r < n; ++r) {
+  float* to = distances.data();
+  for (std::size_t r = 0; r < n; r += row_step, to += n) {
     std::size_t c = 0;
     for (; wide_ && c + kWideLanes <= n; c += kWideLanes) {
-      measure_columns_wide(image, r, c, &distances[r * n + c]);
+      measure_columns_wide(image, r, c, to + c);
     }
     for (; c < n; c += kLanes) {
-      measure_columns(image, r, c, &distances[r * n + c]);
+      measure_columns(image, r, c, to + c);
     }
   }
 }

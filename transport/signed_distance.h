@@ -19,7 +19,13 @@ class DistanceTransform {
 
   // `bits` as visibility_bits() returns them, `distances` [resolution^2]. The same bytes whether
   // the processor has AVX-512 or not.
-  void measure(std::span<const std::uint8_t> bits, std::span<float> distances) const;
+  void measure(std::span<const std::uint8_t> bits, std::span<float> distances) const {
+    measure(bits, 1, distances);
+  }
+
+  // The same for rows 0, row_step, 2 row_step ... alone: [rows so chosen, resolution].
+  void measure(std::span<const std::uint8_t> bits, std::uint32_t row_step,
+               std::span<float> distances) const;
 
  private:
   void nearest_in_rows(std::span<const std::uint8_t> bits, std::span<float> nearest) const;

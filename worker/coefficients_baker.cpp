@@ -1,15 +1,14 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "core/error.h"
 #include "core/half.h"
 #include "proto/arrays.h"
+#include "transport/distance_fit.h"
 #include "transport/pca.h"
-#include "transport/signed_distance.h"
-#include "transport/visibility.h"
 #include "transport/visibility_sg.h"
 #include "worker/bakers.h"
 #include "worker/visibility_images.h"
@@ -17,6 +16,8 @@
 namespace weft::worker {
 
 namespace {
+
+constexpr std::size_t kTogether = 8;  // images between two looks at whether to stop
 
 v1::Half half(float value) { return {core::half_from_float(value)}; }
 
@@ -50,6 +51,7 @@ class CoefficientsBaker : public Baker {
                         "the basis is not of the coefficients' resolution; their stages must have "
                         "the same setting");
     }
+    fit_.emplace(basis_, spec_.resolution());
   }
 
   std::string bake(std::uint64_t shard, const std::string& shard_input,
@@ -58,10 +60,13 @@ class CoefficientsBaker : public Baker {
     const transport::Checkpoint checkpoint = stop_point(should_stop);
     const VisibilityImages images(shard_input, spec_.resolution());
     Result result;
+    for (std::size_t i = 0; i < images.count(); i += kTogether) {
+      transport::pass(checkpoint);
+      add_ssdf(images, i, std::min(i + kTogether, images.count()), result);
+    }
     for (std::size_t i = 0; i < images.count(); ++i) {
       transport::pass(checkpoint);
       const std::uint64_t segment = shard + i * shard_count_;
-      add_ssdf(images.image(i), result);
       add_ssg(images.image(i), static_cast<std::uint32_t>(segment), result);
     }
     const std::uint64_t n = images.count();
@@ -83,25 +88,30 @@ class CoefficientsBaker : public Baker {
     std::array<std::uint32_t, 2> sign_errors{0, 0};
   };
 
-  // Coefficients in half precision, and how many signs of the image come out wrong from these very
-  // halves. Uniform images, which open_share tells, have no coefficients and no errors.
-  void add_ssdf(std::span<const std::uint8_t> image, Result& result) const {
-    std::vector<float> coefficients(basis_.variance.size(), 0.0f);
-    if (!is_uniform(image)) {
-      std::vector<float> distances = transport::signed_distance(image, spec_.resolution());
-      transport::correct_pixel_bias(distances, spec_.resolution());
-      coefficients = transport::project(basis_, distances);
-      for (float& c : coefficients) {
-        c = core::float_from_half(core::half_from_float(c));
+  // Coefficients in half precision of images first ... last - 1, and how many signs come out wrong
+  // from these very halves. Uniform images, which open_share tells, have no coefficients and no
+  // errors.
+  void add_ssdf(const VisibilityImages& images, std::size_t first, std::size_t last,
+                Result& result) const {
+    std::vector<std::uint8_t> varied;
+    for (std::size_t i = first; i < last; ++i) {
+      if (!is_uniform(images.image(i))) {
+        varied.insert(varied.end(), images.image(i).begin(), images.image(i).end());
       }
-      const std::vector<float> decoded = transport::reconstruct(basis_, coefficients);
-      for (std::size_t p = 0; p < decoded.size(); ++p) {
-        result.sign_errors[0] += (decoded[p] > 0) != transport::is_visible(image, p) ? 1 : 0;
-      }
-      result.sign_errors[1] += basis_.pixels;
     }
-    for (const float c : coefficients) {
-      result.ssdf.push_back(half(c));
+    std::vector<float> coefficients = fit_->coefficients(varied);
+    for (float& c : coefficients) {
+      c = core::float_from_half(core::half_from_float(c));
+    }
+    result.sign_errors[0] +=
+        static_cast<std::uint32_t>(transport::wrong_signs(basis_, varied, coefficients));
+    result.sign_errors[1] += static_cast<std::uint32_t>(8 * varied.size());
+    auto next = coefficients.begin();
+    for (std::size_t i = first; i < last; ++i) {
+      const bool is_varied = !is_uniform(images.image(i));
+      for (std::size_t c = 0; c < basis_.variance.size(); ++c) {
+        result.ssdf.push_back(half(is_varied ? *next++ : 0.0f));
+      }
     }
   }
 
@@ -119,6 +129,7 @@ class CoefficientsBaker : public Baker {
   v1::CoefficientsSpec spec_;
   std::uint64_t shard_count_;
   transport::DistanceBasis basis_;
+  std::optional<transport::DistanceFit> fit_;
 };
 
 }  // namespace

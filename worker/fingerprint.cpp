@@ -7,6 +7,7 @@
 #include "core/random.h"
 #include "fabric/untangle.h"
 #include "shading/fibre_bcsdf.h"
+#include "transport/distance_fit.h"
 #include "transport/float_mode.h"
 #include "transport/pca.h"
 #include "transport/signed_distance.h"
@@ -123,6 +124,13 @@ void probe_algebra(core::Hasher& hasher) {
   for (const float value : basis.components) {
     add(hasher, value);
   }
+  std::vector<std::uint8_t> bits(kPixels / 8);
+  for (std::uint8_t& byte : bits) {
+    byte = static_cast<std::uint8_t>(random.below(256));
+  }
+  for (const float value : transport::DistanceFit(basis, 16).coefficients(bits)) {
+    add(hasher, value);
+  }
 }
 
 }  // namespace
@@ -130,7 +138,7 @@ void probe_algebra(core::Hasher& hasher) {
 core::Digest numerics_fingerprint() {
   const transport::FlushDenormals flush;  // as bakers do
   core::Hasher hasher;
-  hasher.field("weft numerics 2");
+  hasher.field("weft numerics 3");
   probe_libm<float>(hasher);
   probe_libm<double>(hasher);
   probe_geometry(hasher);
