@@ -236,5 +236,37 @@ TEST(ServerGate, ANewCertificateIsUsedWithoutARestart) {
       << "the old connection";
 }
 
+// A program that goes on while its own certificate is revoked and issued again.
+TEST(ServerGate, ARunningCallerShowsItsNewCertificateOnItsNextConnection) {
+  const TestAuthority authority;
+  const std::string hub = authority.issue("hub", {}, {"hub"});
+  auto server = std::make_unique<SecuredServer>(Endpoint("127.0.0.1:0", hub, false));
+  const Endpoint here(server->address(), hub, false);
+  constexpr int kLongestWaitMs = 200;
+  const auto channel =
+      open_channel(Endpoint(server->address(), authority.issue("ann", {v1::ROLE_READER}), false),
+                   kLongestWaitMs);
+  EXPECT_EQ(call(channel, kGet).error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  authority.authority().revoke("ann", TestAuthority::now());
+  grpc::StatusCode code = grpc::StatusCode::UNIMPLEMENTED;
+  for (int tries = 0; tries < 300 && code != grpc::StatusCode::UNAUTHENTICATED; ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    code = call(channel, kGet).error_code();
+  }
+  ASSERT_EQ(code, grpc::StatusCode::UNAUTHENTICATED);
+  authority.issue("ann", {v1::ROLE_READER});
+  // The connection that there is was made with the old one. Its folder is looked at every two
+  // seconds, so the first new connection may be, too.
+  for (int tries = 0; tries < 30 && code != grpc::StatusCode::UNIMPLEMENTED; ++tries) {
+    if (code == grpc::StatusCode::UNAUTHENTICATED) {
+      server.reset();
+      server = std::make_unique<SecuredServer>(here);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    code = call(channel, kGet).error_code();
+  }
+  EXPECT_EQ(code, grpc::StatusCode::UNIMPLEMENTED);
+}
+
 }  // namespace
 }  // namespace weft::security

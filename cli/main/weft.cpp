@@ -4,7 +4,7 @@
 
 #include "cli/commands.h"
 #include "core/program.h"
-#include "security/grpc_log.h"
+#include "security/grpc_setup.h"
 
 int main(int argc, char** argv) {
   namespace cli = weft::cli;
@@ -51,6 +51,6 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "weft: there is no command '%s'; weft --help lists them\n", argv[1]);
     return core::kExitWrongUse;
   }
-  weft::security::silence_grpc();
+  weft::security::set_up_grpc(weft::security::GrpcSays::kNothing);
   return core::run_program(app, argc, argv, [] { return 0; });
 }

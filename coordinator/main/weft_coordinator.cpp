@@ -13,7 +13,7 @@
 #include "core/interrupt.h"
 #include "core/program.h"
 #include "security/endpoint_options.h"
-#include "security/grpc_log.h"
+#include "security/grpc_setup.h"
 
 namespace {
 
@@ -30,7 +30,7 @@ struct Options {
 
 int serve(const Options& options) {
   core::start_log(options.log_level);
-  security::log_what_grpc_says();
+  security::set_up_grpc(weft::security::GrpcSays::kToLog);
   const sigset_t signals = core::block_interrupts();
   // A limit of file sizes (ulimit -f) is a full disk to us, which is said before the process ends.
   std::signal(SIGXFSZ, SIG_IGN);

@@ -15,7 +15,7 @@
 #include "proto/address.h"
 #include "render/node/render_node.h"
 #include "security/endpoint_options.h"
-#include "security/grpc_log.h"
+#include "security/grpc_setup.h"
 
 namespace {
 
@@ -42,7 +42,7 @@ double default_memory_gib() {
 
 int serve(Options options) {
   core::start_log(options.log_level);
-  security::log_what_grpc_says();
+  security::set_up_grpc(weft::security::GrpcSays::kToLog);
   const sigset_t signals = core::block_interrupts();
   options.node.cache_limit_bytes = static_cast<std::uint64_t>(options.cache_gib * kGib);
   options.node.memory_limit_bytes = static_cast<std::uint64_t>(options.memory_gib * kGib);

@@ -18,7 +18,7 @@
 #include "proto/names.h"
 #include "security/channel.h"
 #include "security/endpoint_options.h"
-#include "security/grpc_log.h"
+#include "security/grpc_setup.h"
 #include "security/tls_probe.h"
 #include "worker/lease_loop.h"
 
@@ -26,10 +26,6 @@ namespace {
 
 constexpr unsigned kMiB = 1U << 20U;
 constexpr int kLongestReconnectMs = 2000;
-// How often gRPC looks at a connection that is being made while no call waits for it. Its own 5 s
-// come twice, for the connection and for the greeting on it, which is longer than a short lease.
-constexpr const char* kConnectionLook = "GRPC_CLIENT_CHANNEL_BACKUP_POLL_INTERVAL_MS";
-constexpr const char* kConnectionLookMs = "200";
 
 std::string host_name() {
   std::string name(256, '\0');
@@ -117,9 +113,7 @@ void declare(CLI::App& app, Flags& flags) {
 
 void work(Flags flags) {
   weft::core::start_log(flags.log_level);
-  weft::security::log_what_grpc_says();
-  // Before gRPC, and before any thread is started.
-  ::setenv(kConnectionLook, kConnectionLookMs, 0);  // NOLINT(concurrency-mt-unsafe)
+  weft::security::set_up_grpc(weft::security::GrpcSays::kToLog);
   weft::core::Interrupt interrupt;
   // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
   std::signal(SIGXFSZ, SIG_IGN);
