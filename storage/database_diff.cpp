@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <functional>
-#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -21,7 +19,8 @@ namespace weft::storage {
 
 namespace {
 
-constexpr std::uint64_t kBlockNumbers = std::uint64_t{1} << 16;
+constexpr std::uint64_t kPartBytes = std::uint64_t{16} << 20;    // of a dataset, at a time
+constexpr std::uint64_t kBlockNumbers = std::uint64_t{1} << 16;  // unpacked to doubles
 
 template <class T>
 void append_as(std::span<const std::byte> bytes, std::vector<double>& values) {
@@ -73,101 +72,122 @@ std::optional<DatasetSource::Info> info_of(DatasetSource& file, const char* path
   }
 }
 
-// One dataset, read.
-struct Values {
-  std::optional<DatasetSource::Info> info;
-  std::vector<std::byte> bytes;
+// A database whose datasets are read in parts. The library takes two files that it reads from
+// memory for one, so each is open for one part at a time only.
+class ClosedDatabase {
+ public:
+  explicit ClosedDatabase(const std::filesystem::path& path) : bytes_(core::read_file(path)) {}
+
+  [[nodiscard]] std::optional<DatasetSource::Info> info(const char* path) const {
+    h5::Reader file = open();
+    return info_of(file, path);
+  }
+  [[nodiscard]] std::vector<std::byte> rows(const char* path, const DatasetSource::Info& info,
+                                            std::uint64_t first, std::uint64_t count) const {
+    std::vector<std::byte> values(info.bytes / info.shape.front() * count);
+    open().read_rows(path, info, first, count, values);
+    return values;
+  }
+
+ private:
+  [[nodiscard]] h5::Reader open() const {
+    return h5::Reader(std::as_bytes(std::span(bytes_)), kUserBlockBytes);
+  }
+
+  std::string bytes_;
 };
 
-Values values_of(DatasetSource& file, const char* path) {
-  Values values{info_of(file, path), {}};
-  if (values.info) {
-    file.admit(path, *values.info);
-    values.bytes.resize(values.info->bytes);
-    file.read(path, *values.info, values.bytes);
-  }
-  return values;
-}
-
-// By blocks: what is unpacked to doubles is small.
-void compare_numbers(h5::Element from, std::span<const std::byte> a, h5::Element to,
-                     std::span<const std::byte> b, std::uint64_t count,
-                     DatasetDifference& difference) {
-  const std::size_t width_a = a.size() / count;
-  const std::size_t width_b = b.size() / count;
-  double squares = 0;
-  double squares_from = 0;
-  for (std::uint64_t first = 0; first < count; first += kBlockNumbers) {
-    const std::uint64_t taken = std::min(kBlockNumbers, count - first);
-    const std::vector<double> values =
-        numbers_of(from, a.subspan(first * width_a, taken * width_a));
-    const std::vector<double> others = numbers_of(to, b.subspan(first * width_b, taken * width_b));
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const double apart = std::abs(others[i] - values[i]);
-      difference.largest = std::max(difference.largest, apart);
-      squares += apart * apart;
-      squares_from += values[i] * values[i];
+// Of numbers, taken in any parts.
+class Comparison {
+ public:
+  void add(h5::Element from, std::span<const std::byte> a, std::uint64_t width_a, h5::Element to,
+           std::span<const std::byte> b, std::uint64_t width_b) {
+    const std::uint64_t count = a.size() / width_a;
+    for (std::uint64_t first = 0; first < count; first += kBlockNumbers) {
+      const std::uint64_t taken = std::min(kBlockNumbers, count - first);
+      add(numbers_of(from, a.subspan(first * width_a, taken * width_a)),
+          numbers_of(to, b.subspan(first * width_b, taken * width_b)));
     }
   }
-  difference.rms = std::sqrt(squares / static_cast<double>(count));
-  difference.rms_from = std::sqrt(squares_from / static_cast<double>(count));
-}
+  void finish(DatasetDifference& difference) const {
+    difference.largest = largest_;
+    difference.rms = std::sqrt(squares_ / static_cast<double>(count_));
+    difference.rms_from = std::sqrt(squares_from_ / static_cast<double>(count_));
+  }
 
-DatasetDifference compare(const char* path, const Values& a, const Values& b) {
+ private:
+  void add(const std::vector<double>& values, const std::vector<double>& others) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double apart = std::abs(others[i] - values[i]);
+      largest_ = std::max(largest_, apart);
+      squares_ += apart * apart;
+      squares_from_ += values[i] * values[i];
+    }
+    count_ += values.size();
+  }
+
+  double largest_ = 0;
+  double squares_ = 0;
+  double squares_from_ = 0;
+  std::uint64_t count_ = 0;
+};
+
+DatasetDifference compare(const char* path, const ClosedDatabase& from, const ClosedDatabase& to) {
+  const auto a = from.info(path);
+  const auto b = to.info(path);
   DatasetDifference difference;
   difference.path = path;
-  if (a.info) {
-    difference.shape_from = a.info->shape;
+  if (a) {
+    difference.shape_from = a->shape;
   }
-  if (b.info) {
-    difference.shape_to = b.info->shape;
+  if (b) {
+    difference.shape_to = b->shape;
   }
-  if (!a.info || !b.info || a.info->shape != b.info->shape) {
+  if (!a || !b || a->shape != b->shape) {
     return difference;
   }
-  const h5::Element from = a.info->element;
-  const h5::Element to = b.info->element;
-  difference.is_equal = from == to && a.bytes == b.bytes;
-  std::uint64_t count = 1;
-  for (const std::uint64_t extent : a.info->shape) {
-    count *= extent;
+  const bool are_numbers = a->element != h5::Element::kText && b->element != h5::Element::kText;
+  const std::uint64_t rows = a->shape.front();
+  const std::uint64_t row_bytes = std::max(a->bytes, b->bytes) / rows;
+  const std::uint64_t rows_at_once = std::clamp<std::uint64_t>(kPartBytes / row_bytes, 1, rows);
+  difference.is_equal = a->element == b->element && a->bytes == b->bytes;
+  Comparison numbers;
+  for (std::uint64_t first = 0; first < rows; first += rows_at_once) {
+    const std::uint64_t count = std::min(rows_at_once, rows - first);
+    const std::vector<std::byte> values = from.rows(path, *a, first, count);
+    const std::vector<std::byte> others = to.rows(path, *b, first, count);
+    difference.is_equal = difference.is_equal && values == others;
+    if (are_numbers) {
+      numbers.add(a->element, values, a->element_bytes, b->element, others, b->element_bytes);
+    }
   }
-  if (from != h5::Element::kText && to != h5::Element::kText && count > 0) {
-    compare_numbers(from, a.bytes, to, b.bytes, count, difference);
+  if (are_numbers) {
+    numbers.finish(difference);
   }
   return difference;
-}
-
-// The library takes two files that it reads from memory for one, so they are open one at a time.
-void read_each(const std::filesystem::path& path,
-               const std::function<void(const char* path, Values values)>& take) {
-  const std::string bytes = core::read_file(path);
-  h5::Reader file(std::as_bytes(std::span(bytes)), kUserBlockBytes);
-  for (const DatasetSpec& spec : dataset_specs()) {
-    take(spec.path, values_of(file, spec.path));
-  }
 }
 
 }  // namespace
 
 std::vector<DatasetDifference> diff_databases(const std::filesystem::path& from,
                                               const std::filesystem::path& to) {
-  std::map<std::string, Values> first;
-  read_each(from, [&](const char* path, Values values) { first[path] = std::move(values); });
+  const ClosedDatabase a(from);
+  const ClosedDatabase b(to);
   std::vector<DatasetDifference> differences;
-  read_each(to, [&](const char* path, const Values& values) {
-    differences.push_back(compare(path, first.at(path), values));
-    first.erase(path);
-  });
+  for (const DatasetSpec& spec : dataset_specs()) {
+    differences.push_back(compare(spec.path, a, b));
+  }
   return differences;
 }
 
 std::string description_json(const std::filesystem::path& path) {
-  const std::string bytes = core::read_file(path);
-  h5::Reader file(std::as_bytes(std::span(bytes)), kUserBlockBytes);
-  const Values text = values_of(file, "/provenance/description");
-  std::string json(text.bytes.size(), '\0');
-  std::memcpy(json.data(), text.bytes.data(), json.size());
+  constexpr const char* kDescription = "/provenance/description";
+  const ClosedDatabase file(path);
+  const auto info = file.info(kDescription);
+  const std::vector<std::byte> text =
+      info ? file.rows(kDescription, *info, 0, 1) : std::vector<std::byte>();
+  std::string json(text.size(), '\0');
+  std::memcpy(json.data(), text.data(), json.size());
   return json.substr(0, json.find('\0'));
 }
 

@@ -20,9 +20,10 @@ struct DatasetDifference {
   double rms_from = 0;
 };
 
-// All datasets of the schema, in its order. The first one's values, and one dataset of the
-// other at a time, are in memory. Throws core::Error(kDataLoss) naming the dataset. REQUIRES: the
-// files are of our own making, and their digests were checked: they are parsed in this process.
+// All datasets of the schema, in its order. Both files as they are stored, and 16 MiB of a dataset
+// of each (a row at least), are in memory. Throws core::Error(kDataLoss) naming the dataset.
+// REQUIRES: the files are of our own making, and their digests were checked: they are parsed in
+// this process.
 [[nodiscard]] std::vector<DatasetDifference> diff_databases(const std::filesystem::path& from,
                                                             const std::filesystem::path& to);
 

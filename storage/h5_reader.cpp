@@ -236,4 +236,23 @@ void Reader::read(const std::string& path, const Info& info, std::span<std::byte
   }
 }
 
+void Reader::read_rows(const std::string& path, const Info& info, std::uint64_t first,
+                       std::uint64_t count, std::span<std::byte> out) {
+  CHECK(first + count <= info.shape.front());
+  CHECK_EQ(info.bytes / info.shape.front() * count, out.size());
+  const Handle dataset = open(path);
+  const Handle type = type_of(info.element, info.element_bytes);
+  std::vector<hsize_t> begin(info.shape.size(), 0);
+  std::vector<hsize_t> extents(info.shape.begin(), info.shape.end());
+  begin.front() = first;
+  extents.front() = count;
+  const Handle rows(H5Dget_space(dataset.id()));
+  const Handle memory(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr));
+  if (H5Sselect_hyperslab(rows.id(), H5S_SELECT_SET, begin.data(), nullptr, extents.data(),
+                          nullptr) < 0 ||
+      H5Dread(dataset.id(), type.id(), memory.id(), rows.id(), H5P_DEFAULT, out.data()) < 0) {
+    throw_damaged(path, "is damaged: its checksum or its compression does not hold");
+  }
+}
+
 }  // namespace weft::storage::h5
