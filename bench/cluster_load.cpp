@@ -8,17 +8,12 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <sstream>
 #include <thread>
 
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
-#include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
+#include "bench/coordinator_process.h"
 #include "bench/simulated_worker.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -34,88 +29,8 @@ constexpr double kThroughputSeconds = 15;
 constexpr double kWaitingSeconds = 20;
 constexpr int kLatencySamples = 1'000;
 
-// The real program in a process of its own.
-class Coordinator {
- public:
-  Coordinator(std::filesystem::path program, std::filesystem::path state)
-      : program_(std::move(program)), state_(std::move(state)) {}
-  ~Coordinator() { kill(); }
-  Coordinator(const Coordinator&) = delete;
-  Coordinator& operator=(const Coordinator&) = delete;
-  Coordinator(Coordinator&&) = delete;
-  Coordinator& operator=(Coordinator&&) = delete;
-
-  // Returns when it says that it is ready.
-  void start() {
-    int pipes[2];
-    if (::pipe(pipes) != 0) {
-      throw core::Error(core::Code::kUnavailable, "no pipe");
-    }
-    process_ = ::fork();
-    if (process_ == 0) {
-      ::dup2(pipes[1], STDOUT_FILENO);
-      ::execl(program_.c_str(), program_.c_str(), "--listen", "127.0.0.1:0", "--state",
-              state_.c_str(), "--log-level", "error", nullptr);
-      ::_exit(127);
-    }
-    ::close(pipes[1]);
-    std::string line;
-    for (char c = 0; ::read(pipes[0], &c, 1) == 1 && c != '\n';) {
-      line += c;
-    }
-    ::close(pipes[0]);
-    if (line.find(" at ") == std::string::npos) {
-      throw core::Error(core::Code::kUnavailable, program_.string() + " does not start");
-    }
-    address_ = line.substr(line.find(" at ") + 4);
-  }
-  void kill() {
-    if (process_ > 0) {
-      ::kill(process_, SIGKILL);
-      ::waitpid(process_, nullptr, 0);
-      process_ = 0;
-    }
-  }
-
-  [[nodiscard]] std::shared_ptr<grpc::Channel> connect(int number = 0) const {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // a connection of its own
-    arguments.SetInt("weft.number", number);
-    return grpc::CreateCustomChannel(address_, grpc::InsecureChannelCredentials(), arguments);
-  }
-  [[nodiscard]] double cpu_seconds() const {
-    const std::string stat = read("stat");
-    std::istringstream fields(stat.substr(stat.rfind(')') + 2));
-    std::string skipped;
-    for (int i = 0; i < 11; ++i) {
-      fields >> skipped;
-    }
-    double user = 0;
-    double system = 0;
-    fields >> user >> system;
-    return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
-  }
-  [[nodiscard]] double memory_bytes() const { return 1024 * number_after("VmRSS:"); }
-  [[nodiscard]] double threads() const { return number_after("Threads:"); }
-
- private:
-  [[nodiscard]] std::string read(const char* name) const {
-    std::ostringstream out;
-    out << std::ifstream("/proc/" + std::to_string(process_) + "/" + name).rdbuf();
-    return out.str();
-  }
-  [[nodiscard]] double number_after(const std::string& key) const {
-    const std::string status = read("status");
-    return std::stod(status.substr(status.find(key) + key.size()));
-  }
-
-  std::filesystem::path program_;
-  std::filesystem::path state_;
-  pid_t process_ = 0;
-  std::string address_;
-};
-
-std::string submit(const Coordinator& coordinator, const std::string& id, std::uint64_t tasks) {
+std::string submit(const CoordinatorProcess& coordinator, const std::string& id,
+                   std::uint64_t tasks) {
   const auto jobs = v1::JobService::NewStub(coordinator.connect());
   grpc::ClientContext context;
   v1::SubmitRequest request;
@@ -130,7 +45,7 @@ std::string submit(const Coordinator& coordinator, const std::string& id, std::u
   return response.job().id();
 }
 
-void cancel(const Coordinator& coordinator, const std::string& job) {
+void cancel(const CoordinatorProcess& coordinator, const std::string& job) {
   const auto jobs = v1::JobService::NewStub(coordinator.connect());
   grpc::ClientContext context;
   v1::CancelJobRequest request;
@@ -152,7 +67,7 @@ void reach_transfer(SimulatedWorker& worker) {
   }
 }
 
-void measure_throughput(const Coordinator& coordinator, const NoOpResults& results,
+void measure_throughput(const CoordinatorProcess& coordinator, const NoOpResults& results,
                         std::uint64_t work_ms, const char* what) {
   const std::string job = submit(coordinator, std::string("throughput-") + what, 900'000);
   std::vector<std::unique_ptr<SimulatedWorker>> workers;
@@ -191,7 +106,7 @@ void measure_throughput(const Coordinator& coordinator, const NoOpResults& resul
   cancel(coordinator, job);
 }
 
-void measure_latency(const Coordinator& coordinator, const NoOpResults& results) {
+void measure_latency(const CoordinatorProcess& coordinator, const NoOpResults& results) {
   const std::string job = submit(coordinator, "latency", 400'000);
   SimulatedWorker worker(coordinator.connect(), "latency-worker", results);
   worker.work_ms = 20'000;
@@ -212,7 +127,8 @@ void measure_latency(const Coordinator& coordinator, const NoOpResults& results)
   cancel(coordinator, job);
 }
 
-void measure_queued(Coordinator& coordinator, const NoOpResults& results, std::uint64_t tasks) {
+void measure_queued(CoordinatorProcess& coordinator, const NoOpResults& results,
+                    std::uint64_t tasks) {
   const double before = coordinator.memory_bytes();
   const std::string job = submit(coordinator, "queued", tasks);
   {
@@ -235,7 +151,7 @@ void measure_queued(Coordinator& coordinator, const NoOpResults& results, std::u
 // A worker whose calls wait, one after another, on a connection of its own, without a thread.
 class Waiter {
  public:
-  Waiter(const Coordinator& coordinator, int number, const NoOpResults& results)
+  Waiter(const CoordinatorProcess& coordinator, int number, const NoOpResults& results)
       : worker_(coordinator.connect(number), "waiter-" + std::to_string(number), results) {
     worker_.request().set_wait_ms(5'000);
   }
@@ -263,7 +179,7 @@ class Waiter {
   v1::SynchronizeResponse response_;
 };
 
-void measure_waiting(const Coordinator& coordinator, const NoOpResults& results, int count) {
+void measure_waiting(const CoordinatorProcess& coordinator, const NoOpResults& results, int count) {
   const double threads_before = coordinator.threads();
   std::vector<std::unique_ptr<Waiter>> waiters;
   for (int i = 0; i < count; ++i) {
@@ -298,7 +214,7 @@ void measure_waiting(const Coordinator& coordinator, const NoOpResults& results,
 }
 
 // How long until the attempt of a worker that went away is given up.
-void measure_detection(const Coordinator& coordinator, const NoOpResults& results,
+void measure_detection(const CoordinatorProcess& coordinator, const NoOpResults& results,
                        bool closes_connection) {
   const char* const what = closes_connection ? "closed" : "silent";
   const std::string job = submit(coordinator, std::string("detect-") + what, 1'000);
@@ -341,54 +257,14 @@ void measure_detection(const Coordinator& coordinator, const NoOpResults& result
   cancel(coordinator, job);
 }
 
-// The largest blob's bytes, stored and read over loopback.
-void measure_reading(const Coordinator& coordinator) {
-  const auto blobs = v1::BlobService::NewStub(coordinator.connect());
-  constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
-  constexpr std::size_t kChunks = 512;
-  const std::string chunk(kChunkBytes, 'x');
-  core::Hasher hasher;
-  for (std::size_t i = 0; i < kChunks; ++i) {
-    hasher.bytes(chunk);
-  }
-  const core::Digest digest = hasher.finish();
-  grpc::ClientContext writing;
-  v1::WriteResponse written;
-  const core::Stopwatch write_watch;
-  const auto writer = blobs->Write(&writing, &written);
-  v1::WriteRequest request;
-  request.set_digest(digest.binary());
-  request.set_size_bytes(kChunks * kChunkBytes);
-  request.set_data(chunk);
-  for (std::size_t i = 0; i < kChunks && writer->Write(request); ++i) {
-    request.Clear();
-    request.set_data(chunk);
-  }
-  writer->WritesDone();
-  v1::throw_unless_ok(writer->Finish(), "write a blob");
-  const double write_seconds = write_watch.seconds();
-  grpc::ClientContext reading;
-  v1::ReadRequest read;
-  read.set_digest(digest.binary());
-  const core::Stopwatch watch;
-  const auto reader = blobs->Read(&reading, read);
-  std::uint64_t bytes = 0;
-  for (v1::ReadResponse response; reader->Read(&response);) {
-    bytes += response.data().size();
-  }
-  v1::throw_unless_ok(reader->Finish(), "read a blob");
-  const double mebibytes = static_cast<double>(bytes) / (1 << 20);
-  std::printf("blobs: %.0f MiB/s written, %.0f MiB/s read over loopback\n",
-              mebibytes / write_seconds, mebibytes / watch.seconds());
-}
-
 void run(const std::filesystem::path& programs, std::uint64_t tasks, int workers) {
   std::string folder = (std::filesystem::temp_directory_path() / "weft_load_XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr) {
     throw core::Error(core::Code::kUnavailable, "no temporary folder");
   }
   const NoOpResults results(kCells);
-  Coordinator coordinator(programs / "weft-coordinator", std::filesystem::path(folder) / "state");
+  CoordinatorProcess coordinator(programs / "weft-coordinator",
+                                 std::filesystem::path(folder) / "state");
   coordinator.start();
   measure_queued(coordinator, results, tasks);  // first, while its memory is as small as it gets
   measure_throughput(coordinator, results, 60'000, "single");
@@ -396,7 +272,6 @@ void run(const std::filesystem::path& programs, std::uint64_t tasks, int workers
   measure_latency(coordinator, results);
   measure_detection(coordinator, results, true);
   measure_waiting(coordinator, results, workers);
-  measure_reading(coordinator);
   measure_detection(coordinator, results, false);
   coordinator.kill();
   std::filesystem::remove_all(folder);

@@ -8,37 +8,13 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "core/descriptor.h"
 #include "core/error.h"
 #include "core/file_fault.h"
 
 namespace weft::core {
 
 namespace {
-
-[[noreturn]] void throw_errno(const std::string& what, const std::filesystem::path& path) {
-  throw Error(Code::kUnavailable, "cannot " + what + " " + path.string() + ": " +
-                                      std::generic_category().message(errno));
-}
-
-// A file descriptor that closes itself.
-class Descriptor {
- public:
-  Descriptor(const std::filesystem::path& path, int flags)
-      : value_(file_system::open(path, flags)) {
-    if (value_ < 0) {
-      throw_errno("open", path);
-    }
-  }
-  ~Descriptor() { ::close(value_); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  Descriptor(Descriptor&&) = delete;
-  Descriptor& operator=(Descriptor&&) = delete;
-  [[nodiscard]] int value() const { return value_; }
-
- private:
-  int value_;
-};
 
 std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
@@ -73,39 +49,22 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view d
       path.string() + "." + std::to_string(::getpid()) + "." + std::to_string(++counter) + ".part";
   {
     const Descriptor file(beside, O_WRONLY | O_CREAT | O_TRUNC);
-    std::size_t written = 0;
-    while (written < data.size()) {
-      const ssize_t n =
-          file_system::write(file.value(), beside, data.data() + written, data.size() - written);
-      if (n < 0 && errno == EINTR) {
-        continue;
-      }
-      if (n < 0) {
-        const int cause = errno;
-        ::unlink(beside.c_str());
-        errno = cause;
-        throw_errno("write", path);
-      }
-      written += static_cast<std::size_t>(n);
+    if (!file.write(data)) {
+      const int cause = errno;
+      ::unlink(beside.c_str());
+      errno = cause;
+      throw_errno("write", path);
     }
   }
   publish_file(beside, path);
 }
 
 void publish_file(const std::filesystem::path& from, const std::filesystem::path& to) {
-  {
-    const Descriptor file(from, O_RDONLY);
-    if (file_system::sync(file.value(), from) != 0) {
-      throw_errno("sync", from);
-    }
-  }
+  Descriptor(from, O_RDONLY).sync();
   if (file_system::rename(from, to) != 0) {
     throw_errno("rename to", to);
   }
-  const Descriptor folder(folder_of(to), O_RDONLY | O_DIRECTORY);
-  if (file_system::sync(folder.value(), folder_of(to)) != 0) {
-    throw_errno("sync", folder_of(to));
-  }
+  Descriptor(folder_of(to), O_RDONLY | O_DIRECTORY).sync();
 }
 
 }  // namespace weft::core

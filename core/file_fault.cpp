@@ -55,10 +55,18 @@ int sync(int descriptor, const std::filesystem::path& path) {
   return fault_of(FileOperation::kSync, path).error != 0 ? -1 : ::fsync(descriptor);
 }
 
+int sync_all(int descriptor, const std::filesystem::path& path) {
+  return fault_of(FileOperation::kSyncAll, path).error != 0 ? -1 : ::syncfs(descriptor);
+}
+
 int rename(const std::filesystem::path& from, const std::filesystem::path& to) {
   return fault_of(FileOperation::kRename, from, to).error != 0
              ? -1
              : std::rename(from.c_str(), to.c_str());
+}
+
+int remove(const std::filesystem::path& path) {
+  return fault_of(FileOperation::kRemove, path).error != 0 ? -1 : ::unlink(path.c_str());
 }
 
 }  // namespace file_system

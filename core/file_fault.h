@@ -7,12 +7,19 @@
 
 #include <sys/types.h>
 
-// The calls by which core/file writes, with a seam: a test can make any of them fail. Without a
-// hook each costs one comparison more than the system call.
+// The calls by which core/file and core/file_batch write, with a seam: a test can make any of them
+// fail. Without a hook each costs one comparison more than the system call.
 
 namespace weft::core {
 
-enum class FileOperation : std::uint8_t { kOpen, kWrite, kSync, kRename };
+enum class FileOperation : std::uint8_t {
+  kOpen,
+  kWrite,
+  kSync,
+  kSyncAll,  // of the file system that `path` is in
+  kRename,
+  kRemove,
+};
 
 struct FileCall {
   FileOperation operation = FileOperation::kOpen;
@@ -39,7 +46,9 @@ namespace file_system {
 [[nodiscard]] ssize_t write(int descriptor, const std::filesystem::path& path, const char* data,
                             std::size_t size);
 [[nodiscard]] int sync(int descriptor, const std::filesystem::path& path);
+[[nodiscard]] int sync_all(int descriptor, const std::filesystem::path& path);
 [[nodiscard]] int rename(const std::filesystem::path& from, const std::filesystem::path& to);
+[[nodiscard]] int remove(const std::filesystem::path& path);
 }  // namespace file_system
 
 }  // namespace weft::core

@@ -1,14 +1,17 @@
 #include "storage/blob_store.h"
 
 #include <algorithm>
+#include <atomic>
 #include <system_error>
 #include <vector>
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/file_fault.h"
 #include "core/folder.h"
 
 namespace weft::storage {
@@ -16,6 +19,7 @@ namespace weft::storage {
 namespace {
 
 constexpr const char* kTrash = "trash";
+constexpr const char* kIncoming = "incoming";
 constexpr std::int64_t kMsPerSecond = 1000;
 constexpr std::int64_t kNsPerMs = 1'000'000;
 
@@ -52,7 +56,7 @@ std::vector<std::string> names_in(const std::filesystem::path& folder) {
 void visit_folder(const std::filesystem::path& folder, const BlobStore::Visit& visit) {
   for (const std::string& first : names_in(folder)) {
     if (first.size() != 2) {
-      continue;  // the trash
+      continue;  // the trash, what is incoming
     }
     for (const std::string& rest : names_in(folder / first)) {
       const std::optional<core::Digest> digest = core::Digest::from_hex(first + rest);
@@ -62,6 +66,12 @@ void visit_folder(const std::filesystem::path& folder, const BlobStore::Visit& v
       }
     }
   }
+}
+
+// In a folder that several processes write to.
+std::string unique_name() {
+  static std::atomic<std::uint64_t> counter{0};
+  return std::to_string(::getpid()) + "." + std::to_string(++counter);
 }
 
 std::filesystem::path path_in(const std::filesystem::path& folder, const core::Digest& digest) {
@@ -96,12 +106,25 @@ core::Digest BlobStore::put(std::string_view data) {
   return digest;
 }
 
-bool BlobStore::put_checked(const core::Digest& digest, std::string_view data) {
-  if (use(digest) && get(digest)) {
+BlobStore::Batch::Batch(BlobStore& store)
+    : store_(store), files_(store.folder() / kIncoming / unique_name()) {}
+
+bool BlobStore::Batch::put(const core::Digest& digest, std::string_view data) {
+  if (own_.contains(digest) || (store_.use(digest) && store_.get(digest))) {
     return true;
   }
-  put(data);
+  const std::filesystem::path path = store_.path_of(digest);
+  core::make_folder(path.parent_path());
+  files_.write(path, data);
+  own_.insert(digest);
   return false;
+}
+
+void BlobStore::Batch::commit() { files_.commit(); }
+
+void BlobStore::remove_unfinished() const {
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_ / kIncoming, ignored);
 }
 
 void BlobStore::adopt(const std::filesystem::path& file, const core::Digest& digest) {
@@ -152,14 +175,11 @@ bool BlobStore::restore(const core::Digest& digest) const {
   }
   const std::filesystem::path path = path_of(digest);
   core::make_folder(path.parent_path());
-  std::error_code failure;
-  std::filesystem::rename(kept, path, failure);
-  return !failure;
+  return core::file_system::rename(kept, path) == 0;
 }
 
 void BlobStore::remove(const core::Digest& digest) const {
-  std::error_code gone_already;
-  std::filesystem::remove(path_of(digest), gone_already);
+  (void)core::file_system::remove(path_of(digest));  // it may be gone already
 }
 
 void BlobStore::visit(const Visit& visit) const { visit_folder(folder_, visit); }
@@ -176,17 +196,14 @@ bool BlobStore::trash(const core::Digest& digest, std::int64_t before_ms) const 
   if (!facts || facts->modified_at_ms >= before_ms || !touch(path)) {
     return false;
   }
-  std::error_code failure;
-  std::filesystem::rename(path, kept, failure);
-  return !failure;
+  return core::file_system::rename(path, kept) == 0;
 }
 
 bool BlobStore::empty(const core::Digest& digest, std::int64_t before_ms) const {
   const std::filesystem::path kept = trash_path_of(digest);
   const std::lock_guard lock(mutex_);
   const std::optional<FileFacts> facts = facts_of(kept);
-  std::error_code failure;
-  return facts && facts->modified_at_ms < before_ms && std::filesystem::remove(kept, failure);
+  return facts && facts->modified_at_ms < before_ms && core::file_system::remove(kept) == 0;
 }
 
 }  // namespace weft::storage

@@ -5,10 +5,12 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
 #include "core/digest.h"
+#include "core/file_batch.h"
 
 namespace weft::storage {
 
@@ -24,9 +26,25 @@ class BlobStore {
 
   // Stores `data` and returns its digest; durable on return. It counts as used now.
   core::Digest put(std::string_view data);
-  // The same, but what is there already is read, and written again when it is damaged. Says whether
-  // it was there. REQUIRES: `digest` is that of `data`.
-  bool put_checked(const core::Digest& digest, std::string_view data);
+  // Many blobs that are durable together, and cost few syncs. Not committed, none of them is there.
+  class Batch {
+   public:
+    // `store` must outlive this.
+    explicit Batch(BlobStore& store);
+    // What is there already is read, and written again when it is damaged. Says whether it was
+    // there. REQUIRES: `digest` is that of `data`.
+    bool put(const core::Digest& digest, std::string_view data);
+    // All that was put, or was found there, is durable on return. Throws
+    // core::Error(kUnavailable). Once.
+    void commit();
+
+   private:
+    BlobStore& store_;
+    core::FileBatch files_;
+    std::set<core::Digest> own_;
+  };
+  // Removes what batches of processes that died have left. REQUIRES: no batch is under way.
+  void remove_unfinished() const;
   // Takes over a file that is complete, in the same file system. REQUIRES: its bytes have the
   // digest.
   void adopt(const std::filesystem::path& file, const core::Digest& digest);

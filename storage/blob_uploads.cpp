@@ -17,6 +17,7 @@ namespace weft::storage {
 namespace {
 
 constexpr std::size_t kHashBytes = std::size_t{1} << 20;
+constexpr std::uint64_t kAheadBytes = std::uint64_t{8} << 20;
 
 struct Part {
   std::int64_t grown_at_ms = 0;
@@ -115,8 +116,14 @@ BlobUpload::BlobUpload(BlobUploads& uploads, const core::Digest& digest, std::ui
   std::string buffer(static_cast<std::size_t>(std::min<std::uint64_t>(kHashBytes, offset)), '\0');
   while (come_bytes_ < offset) {
     const ssize_t n = ::read(file_, buffer.data(), buffer.size());
+    if (n < 0 && errno == EINTR) {
+      continue;
+    }
     if (n <= 0) {
-      abandon("read");
+      drop();
+      ::close(file_);
+      throw core::Error(core::Code::kDataLoss, "what was kept of blob " + digest_.hex() +
+                                                   " cannot be read; begin again at 0");
     }
     hasher_.bytes(std::string_view(buffer).substr(0, static_cast<std::size_t>(n)));
     come_bytes_ += static_cast<std::uint64_t>(n);
@@ -151,6 +158,13 @@ void BlobUpload::add(std::string_view bytes) {
     }
     bytes.remove_prefix(static_cast<std::size_t>(n));
     come_bytes_ += static_cast<std::uint64_t>(n);
+    unstarted_bytes_ += static_cast<std::uint64_t>(n);
+  }
+  // The disk works while further bytes come, and finish() waits for the last of them only.
+  if (unstarted_bytes_ >= kAheadBytes) {
+    (void)::sync_file_range(file_, static_cast<off_t>(come_bytes_ - unstarted_bytes_),
+                            static_cast<off_t>(unstarted_bytes_), SYNC_FILE_RANGE_WRITE);
+    unstarted_bytes_ = 0;
   }
 }
 

@@ -33,8 +33,8 @@ class BlobUploads {
 
   // Goes on with an upload at `offset`; at 0 it begins anew. Nothing when another upload of the
   // blob is under way. Throws core::Error: kInvalidArgument when `offset` is neither 0 nor
-  // committed_bytes, kResourceExhausted when the disk is full, kUnavailable when the file cannot be
-  // written.
+  // committed_bytes, kDataLoss when what was kept cannot be read (it is then dropped),
+  // kResourceExhausted when the disk is full, kUnavailable when the file cannot be written.
   [[nodiscard]] std::unique_ptr<BlobUpload> begin(const core::Digest& digest,
                                                   std::uint64_t size_bytes, std::uint64_t offset);
 
@@ -64,8 +64,8 @@ class BlobUpload {
   BlobUpload(BlobUpload&&) = delete;
   BlobUpload& operator=(BlobUpload&&) = delete;
 
-  // The next bytes. Throws core::Error: kDataLoss when they are more than were announced, and as
-  // begin().
+  // The next bytes. Throws core::Error: kDataLoss when they are more than were announced,
+  // kResourceExhausted and kUnavailable as begin().
   void add(std::string_view bytes);
   // Puts the blob into the store; durable on return. Throws core::Error(kDataLoss) when bytes are
   // missing or it has another digest; what came is then dropped, unless bytes are missing.
@@ -82,6 +82,7 @@ class BlobUpload {
   std::uint64_t come_bytes_ = 0;
   std::filesystem::path path_;
   int file_ = -1;
+  std::uint64_t unstarted_bytes_ = 0;  // whose way to the disk has not begun
   core::Hasher hasher_;
 };
 

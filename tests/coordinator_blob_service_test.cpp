@@ -133,5 +133,22 @@ TEST_F(Blobs, UploadThatEndsEarlyStoresNothingAndKeepsWhatCame) {
   EXPECT_EQ(query().committed_bytes(), 100'000U);
 }
 
+// As a power loss may leave it.
+TEST_F(Blobs, UploadOnTopOfDamagedBytes_IsToldSoAndBeginsAgain) {
+  EXPECT_FALSE(send(0, 300'000, true).ok());
+  stop();
+  const std::filesystem::path kept = folder_ / "state" / "blobs" / "uploads" / digest_.hex();
+  std::string bytes = core::read_file(kept);
+  bytes[200'000] = static_cast<char>(bytes[200'000] ^ 1);
+  core::write_file_atomically(kept, bytes);
+  start();
+  ASSERT_EQ(query().committed_bytes(), 300'000U);
+  EXPECT_EQ(send_when_free(300'000, data_.size() - 300'000).error_code(),
+            grpc::StatusCode::DATA_LOSS);
+  EXPECT_EQ(query().committed_bytes(), 0U);
+  EXPECT_TRUE(send_when_free(0, data_.size()).ok());
+  EXPECT_TRUE(query().complete());
+}
+
 }  // namespace
 }  // namespace weft::coordinator

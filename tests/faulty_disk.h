@@ -12,6 +12,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <sqlite3.h>
@@ -21,8 +22,8 @@
 namespace weft::coordinator {
 
 // A disk on which one operation goes wrong: under SQLite it is a VFS of its own, the default while
-// this lives; under core/file it is the fault hook. Writes, syncs, renames and openings for writing
-// are counted together, from 1. There is one at a time.
+// this lives; under core/file it is the fault hook. Writes, syncs, renames, removals and openings
+// for writing are counted together, from 1. There is one at a time.
 class FaultyDisk {
  public:
   enum class Fault : std::uint8_t {
@@ -102,10 +103,13 @@ class FaultyDisk {
       }
       std::ofstream(path, std::ios::binary | std::ios::trunc) << content;
     }
-    for (const auto& [path, is_torn] : renamed_) {
-      if (random() % 2 == 0) {
-        std::filesystem::remove(path);
-      } else if (is_torn && std::filesystem::exists(path)) {
+    for (const auto& [path, move] : renamed_) {
+      std::error_code gone;  // it may have been removed since
+      if (random() % 2 == 0 && move.had_a_name) {
+        std::filesystem::rename(path, move.from, gone);
+      } else if (random() % 2 == 0 && !move.had_a_name) {
+        std::filesystem::remove(path, gone);
+      } else if (move.is_torn && std::filesystem::exists(path)) {
         std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
       }
     }
@@ -118,6 +122,7 @@ class FaultyDisk {
     unsynced_.clear();
     renamed_.clear();
     synced_.clear();
+    written_.clear();
   }
 
  private:
@@ -146,6 +151,11 @@ class FaultyDisk {
     sqlite3_file base;
     sqlite3_file* real;
     std::string* path;
+  };
+  struct Move {
+    std::string from;
+    bool is_torn = false;     // its bytes may be lost
+    bool had_a_name = false;  // that was on the disk: it has the old one or the new one
   };
   enum class Outcome : std::uint8_t { kGood, kFails, kFull, kShort };
 
@@ -201,13 +211,29 @@ class FaultyDisk {
       case Outcome::kGood:
         break;
     }
-    if (call.operation == core::FileOperation::kSync) {
+    if (is_write) {
+      written_.insert(call.path.string());
+    } else if (call.operation == core::FileOperation::kSyncAll) {
+      synced_.merge(written_);
+      written_.clear();
+      renamed_.clear();
+    } else if (call.operation == core::FileOperation::kSync) {
       synced_.insert(call.path.string());
       std::erase_if(renamed_, [&](const auto& entry) {
         return std::filesystem::path(entry.first).parent_path() == call.path;
       });
     } else if (call.operation == core::FileOperation::kRename) {
-      renamed_[call.to.string()] = !synced_.contains(call.path.string());
+      const std::string from = call.path.string();
+      const auto earlier = renamed_.find(from);
+      const bool is_new = written_.contains(from) || synced_.contains(from);
+      Move move{from, is_new && !synced_.contains(from), !is_new};
+      if (earlier != renamed_.end()) {
+        move = earlier->second;
+        renamed_.erase(earlier);
+      }
+      renamed_[call.to.string()] = move;
+    } else if (call.operation == core::FileOperation::kRemove) {
+      renamed_.erase(call.path.string());
     }
     return {};
   }
@@ -339,8 +365,9 @@ class FaultyDisk {
   bool has_struck_ = false;
   bool full_next_ = false;                              // after a short write
   std::map<std::string, std::vector<Write>> unsynced_;  // of SQLite's files
-  std::map<std::string, bool> renamed_;  // since their folders were synced; whether without a sync
+  std::map<std::string, Move> renamed_;                 // since their folders were synced
   std::set<std::string> synced_;
+  std::set<std::string> written_;  // and perhaps not synced
 };
 
 }  // namespace weft::coordinator

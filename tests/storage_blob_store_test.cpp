@@ -80,6 +80,39 @@ TEST_F(BlobStoreTest, ManyThreadsPutTheSameBlobAtOnce) {
   EXPECT_EQ(store.get(core::digest_of("blob 7")), "blob 7");
 }
 
+TEST_F(BlobStoreTest, BatchIsThereWhenItIsCommitted) {
+  BlobStore store(folder_);
+  const core::Digest there = store.put("there");
+  const core::Digest damaged = store.put("damaged");
+  std::ofstream(store.path_of(damaged), std::ios::binary) << "dAmaged";
+  const core::Digest fresh = core::digest_of("fresh");
+  {
+    BlobStore::Batch batch(store);
+    EXPECT_TRUE(batch.put(there, "there"));
+    EXPECT_FALSE(batch.put(damaged, "damaged"));
+    EXPECT_FALSE(batch.put(fresh, "fresh"));
+    EXPECT_TRUE(batch.put(fresh, "fresh"));
+    EXPECT_FALSE(store.has(fresh));
+    std::size_t blobs = 0;
+    store.visit([&](const BlobStore::Entry&) { ++blobs; });
+    EXPECT_EQ(blobs, 1U);
+    batch.commit();
+  }
+  EXPECT_EQ(store.get(there), "there");
+  EXPECT_EQ(store.get(damaged), "damaged");
+  EXPECT_EQ(store.get(fresh), "fresh");
+}
+
+TEST_F(BlobStoreTest, WhatABatchLeftWhenItsProcessDiedIsRemoved) {
+  BlobStore store(folder_);
+  const core::Digest there = store.put("there");
+  std::filesystem::create_directories(folder_ / "incoming" / "77.1");
+  core::write_file_atomically(folder_ / "incoming" / "77.1" / "0", "half of a bl");
+  store.remove_unfinished();
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "incoming" / "77.1"));
+  EXPECT_EQ(store.get(there), "there");
+}
+
 TEST_F(BlobStoreTest, FolderThatCannotBeMadeIsAnError) {
   std::filesystem::create_directories(folder_);
   core::write_file_atomically(folder_ / "file", "not a folder");

@@ -146,10 +146,12 @@ void BlobClient::write(const core::Digest& digest, std::string_view data,
     if (should_stop()) {
       throw core::Error(core::Code::kCancelled, "stopped while writing a blob");
     }
-    // Somebody else uploads it, or the coordinator has kept less of it than it said.
+    // Somebody else uploads it, the coordinator has kept less of it than it said, or what it kept
+    // was damaged, and is dropped.
     const bool is_elsewhere = status.error_code() == grpc::StatusCode::ABORTED ||
                               status.error_code() == grpc::StatusCode::OUT_OF_RANGE;
-    if (!is_away(status) && !is_elsewhere) {
+    const bool was_damaged = status.error_code() == grpc::StatusCode::DATA_LOSS && offset > 0;
+    if (!is_away(status) && !is_elsewhere && !was_damaged) {
       v1::throw_unless_ok(status, "write blob " + digest.hex());
     }
     back_off.wait(should_stop);
@@ -157,7 +159,7 @@ void BlobClient::write(const core::Digest& digest, std::string_view data,
     if (!kept) {
       return;
     }
-    offset = *kept <= data.size() ? *kept : 0;
+    offset = *kept <= data.size() && !was_damaged ? *kept : 0;
   }
 }
 

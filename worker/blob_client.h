@@ -28,7 +28,8 @@ class BlobClient {
   [[nodiscard]] std::string read(const core::Digest& digest,
                                  const std::function<bool()>& should_stop);
 
-  // Stores the blob with the coordinator; goes on where a broken upload ended. Throws
+  // Stores the blob with the coordinator; goes on where a broken upload ended, or begins again when
+  // what is there of it is damaged. Throws
   // core::Error(kResourceExhausted) when it is too large or the coordinator's disk is full.
   void write(const core::Digest& digest, std::string_view data,
              const std::function<bool()>& should_stop);

@@ -6,6 +6,7 @@
 
 #include "coordinator/versions/catalogue.h"
 #include "core/error.h"
+#include "core/file_fault.h"
 #include "core/folder.h"
 #include "proto/names.h"
 #include "storage/user_block.h"
@@ -51,19 +52,24 @@ Catalogue::Catalogue(Journal& journal, const std::filesystem::path& state_folder
   std::error_code ignored;  // what stays is found again
   std::filesystem::remove_all(assembled_, ignored);
   core::make_folder(assembled_);
+  pieces_.remove_unfinished();
 }
 
 // Cuts a file and stores what is not there; durable on return.
 std::vector<storage::Piece> Catalogue::store(const std::filesystem::path& file,
                                              std::uint64_t* shared_bytes) {
+  storage::BlobStore::Batch batch(pieces_);
   std::set<core::Digest> own;
-  return storage::cut_file(file, [&](const storage::Piece& piece, std::string_view bytes) {
-    const bool was_there = pieces_.put_checked(piece.digest, bytes);
-    const bool is_new_here = own.insert(piece.digest).second;
-    if (shared_bytes != nullptr && was_there && is_new_here) {
-      *shared_bytes += piece.size_bytes;
-    }
-  });
+  std::vector<storage::Piece> pieces =
+      storage::cut_file(file, [&](const storage::Piece& piece, std::string_view bytes) {
+        const bool was_there = batch.put(piece.digest, bytes);
+        const bool is_new_here = own.insert(piece.digest).second;
+        if (shared_bytes != nullptr && was_there && is_new_here) {
+          *shared_bytes += piece.size_bytes;
+        }
+      });
+  batch.commit();
+  return pieces;
 }
 
 void Catalogue::prepare(Publication& publication) {
@@ -142,12 +148,10 @@ std::vector<storage::Piece> Catalogue::cut_whole_file(const VersionRecord& versi
     }
     pieces = store(source, nullptr);
     journal_.set_pieces(version.fabric, version.number, *pieces);
-    std::error_code ignored;  // what stays is wiped by the next start
-    std::filesystem::remove(source, ignored);
+    (void)core::file_system::remove(source);  // what stays is wiped by the next start
     spdlog::info("version={} event=cut pieces={}", text_of(version), pieces->size());
   }
-  std::error_code gone_already;
-  std::filesystem::remove(path, gone_already);
+  (void)core::file_system::remove(path);  // it may be gone already
   return *std::move(pieces);
 }
 
