@@ -1,6 +1,10 @@
+#include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -18,49 +22,109 @@ namespace {
 
 using testing::HasSubstr;
 
+// More than gRPC takes for a caller that does not read.
+constexpr std::size_t kLargeBytes = std::size_t{4} << 20;
+
+std::shared_ptr<grpc::Channel> connected(const std::string& address) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);  // takes 64 KiB more than is read, always
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
 class LimitsTest : public ServiceTest {
  protected:
   static void expect_limit(const grpc::Status& status, const std::string& limit) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
     EXPECT_THAT(status.error_message(), testing::StartsWith(limit + ":"));
   }
+
+  // Opens as many calls as there may be: by one connection, then by several. `make` gives an object
+  // with connect_anew() and add() that holds what it opened.
+  template <class Make>
+  static void expect_limits(const std::string& name, int limit, int limit_per_connection,
+                            const Make& make) {
+    {
+      const auto calls = make();
+      calls->connect_anew();
+      for (int i = 0; i < limit_per_connection; ++i) {
+        ASSERT_FALSE(calls->add()) << name << " " << i;
+      }
+      const std::optional<grpc::Status> refused = calls->add();
+      ASSERT_TRUE(refused) << name;
+      expect_limit(*refused, name + "_per_connection_limit");
+      for (int i = limit_per_connection; i < limit; ++i) {
+        if (i % limit_per_connection == 0) {
+          calls->connect_anew();
+        }
+        ASSERT_FALSE(calls->add()) << name << " " << i;
+      }
+      calls->connect_anew();
+      const std::optional<grpc::Status> another = calls->add();
+      ASSERT_TRUE(another) << name;
+      expect_limit(*another, name + "_limit");
+    }
+    // Those that are over make room, when the server has noticed it.
+    const auto calls = make();
+    calls->connect_anew();
+    std::optional<grpc::Status> refused = calls->add();
+    for (int i = 0; i < 2'000 && refused; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      refused = calls->add();
+    }
+    EXPECT_FALSE(refused) << name << ": " << refused->error_message();
+  }
+
+  // A version of kLargeBytes that are nowhere the same.
+  std::vector<storage::Piece> publish_large(const std::string& fabric) {
+    std::string content(kLargeBytes, '\0');
+    std::uint32_t state = 1;
+    for (char& byte : content) {
+      state = state * 1664525 + 1013904223;
+      byte = static_cast<char>(state >> 24);
+    }
+    Publication publication;
+    publication.fabric = fabric;
+    publication.file = folder_ / "state" / "committing" / "large.h5";
+    publication.content_digest = core::digest_of(content);
+    publication.job = "j1";
+    core::write_file_atomically(publication.file, content);
+    scheduler_->catalogue().prepare(publication);
+    (void)scheduler_->catalogue().publish(publication);
+    return publication.pieces;
+  }
 };
 
-// WatchJob calls that stay open.
-class Watchers {
+// Calls that send something and stay open, because nobody reads on.
+template <class Service, class Response>
+class HeldReads {
  public:
-  Watchers(std::string address, std::string job)
-      : address_(std::move(address)), request_([&] {
-          v1::WatchJobRequest request;
-          request.set_job_id(job);
-          return request;
-        }()) {}
-  ~Watchers() {
+  using Reader = std::unique_ptr<grpc::ClientReader<Response>>;
+  using Start = std::function<Reader(typename Service::Stub& stub, grpc::ClientContext* context)>;
+
+  HeldReads(std::string address, Start start)
+      : address_(std::move(address)), start_(std::move(start)) {}
+  ~HeldReads() {
     for (const std::unique_ptr<Call>& call : calls_) {
       call->context.TryCancel();
-      v1::WatchJobResponse response;
+      Response response;
       while (call->reader->Read(&response)) {
       }
       (void)call->reader->Finish();
     }
   }
-  Watchers(const Watchers&) = delete;
-  Watchers& operator=(const Watchers&) = delete;
-  Watchers(Watchers&&) = delete;
-  Watchers& operator=(Watchers&&) = delete;
+  HeldReads(const HeldReads&) = delete;
+  HeldReads& operator=(const HeldReads&) = delete;
+  HeldReads(HeldReads&&) = delete;
+  HeldReads& operator=(HeldReads&&) = delete;
 
   // All further ones come by a connection of their own.
-  void connect_anew() {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    stub_ = v1::JobService::NewStub(
-        grpc::CreateCustomChannel(address_, grpc::InsecureChannelCredentials(), arguments));
-  }
+  void connect_anew() { stub_ = Service::NewStub(connected(address_)); }
   // Nothing when the call is open now, else how it ended.
   std::optional<grpc::Status> add() {
     auto call = std::make_unique<Call>();
-    call->reader = stub_->WatchJob(&call->context, request_);
-    v1::WatchJobResponse response;
+    call->reader = start_(*stub_, &call->context);
+    Response response;
     if (!call->reader->Read(&response)) {
       return call->reader->Finish();
     }
@@ -71,43 +135,127 @@ class Watchers {
  private:
   struct Call {
     grpc::ClientContext context;
-    std::unique_ptr<grpc::ClientReader<v1::WatchJobResponse>> reader;
+    Reader reader;
   };
   std::string address_;
-  v1::WatchJobRequest request_;
-  std::unique_ptr<v1::JobService::Stub> stub_;
+  Start start_;
+  std::unique_ptr<typename Service::Stub> stub_;
   std::vector<std::unique_ptr<Call>> calls_;
+};
+
+// Uploads of which a part has come.
+class HeldUploads {
+ public:
+  explicit HeldUploads(std::string address) : address_(std::move(address)) {}
+  ~HeldUploads() {
+    for (const std::unique_ptr<Call>& call : calls_) {
+      call->context.TryCancel();
+      (void)call->writer->Finish();
+    }
+  }
+  HeldUploads(const HeldUploads&) = delete;
+  HeldUploads& operator=(const HeldUploads&) = delete;
+  HeldUploads(HeldUploads&&) = delete;
+  HeldUploads& operator=(HeldUploads&&) = delete;
+
+  void connect_anew() { stub_ = v1::BlobService::NewStub(connected(address_)); }
+  std::optional<grpc::Status> add() {
+    auto call = std::make_unique<Call>();
+    call->writer = stub_->Write(&call->context, &call->response);
+    v1::WriteRequest request;
+    const core::Digest digest = core::digest_of("upload " + std::to_string(++begun_));
+    request.set_digest(digest.binary());
+    request.set_size_bytes(2'000);
+    request.set_data(std::string(1'000, 'x'));
+    call->writer->Write(request);
+    for (int i = 0; i < kPatience && committed(digest) < 1'000; ++i) {
+      if (call->has_ended()) {
+        return call->writer->Finish();
+      }
+    }
+    calls_.push_back(std::move(call));
+    return std::nullopt;
+  }
+
+ private:
+  static constexpr int kPatience = 1'000;
+
+  struct Call {
+    // Only a server that has ended the call does not take more.
+    [[nodiscard]] bool has_ended() {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      return !writer->Write(v1::WriteRequest());
+    }
+    grpc::ClientContext context;
+    v1::WriteResponse response;
+    std::unique_ptr<grpc::ClientWriter<v1::WriteRequest>> writer;
+  };
+  std::uint64_t committed(const core::Digest& digest) {
+    grpc::ClientContext context;
+    v1::QueryWriteRequest request;
+    request.set_digest(digest.binary());
+    v1::QueryWriteResponse response;
+    EXPECT_TRUE(stub_->QueryWrite(&context, request, &response).ok());
+    return response.committed_bytes();
+  }
+
+  std::string address_;
+  std::unique_ptr<v1::BlobService::Stub> stub_;
+  std::vector<std::unique_ptr<Call>> calls_;
+  int begun_ = 0;
 };
 
 TEST_F(LimitsTest, WatchersAreLimitedForEachConnectionAndInAll) {
   v1::Job job;
   ASSERT_TRUE(submit("watched", small_description(), &job).ok());
-  Watchers watchers(server_->address(), job.id());
-  for (int i = 0; i < v1::kWatchersLimit; ++i) {
-    if (i % v1::kWatchersPerConnectionLimit == 0) {
-      watchers.connect_anew();
-    }
-    ASSERT_FALSE(watchers.add()) << i;
-  }
-  watchers.connect_anew();
-  const std::optional<grpc::Status> refused = watchers.add();
-  ASSERT_TRUE(refused);
-  expect_limit(*refused, "watchers_limit");
+  v1::WatchJobRequest request;
+  request.set_job_id(job.id());
+  expect_limits("watchers", v1::kWatchersLimit, v1::kWatchersPerConnectionLimit, [&] {
+    return std::make_unique<HeldReads<v1::JobService, v1::WatchJobResponse>>(
+        server_->address(), [&](v1::JobService::Stub& stub, grpc::ClientContext* context) {
+          return stub.WatchJob(context, request);
+        });
+  });
 }
 
-TEST_F(LimitsTest, OneConnectionCannotTakeAllWatchers) {
-  v1::Job job;
-  ASSERT_TRUE(submit("watched", small_description(), &job).ok());
-  Watchers watchers(server_->address(), job.id());
-  watchers.connect_anew();
-  for (int i = 0; i < v1::kWatchersPerConnectionLimit; ++i) {
-    ASSERT_FALSE(watchers.add()) << i;
+TEST_F(LimitsTest, FetchesAreLimitedForEachConnectionAndInAll) {
+  const std::vector<storage::Piece> pieces = publish_large("large");
+  v1::FetchVersionRequest whole;
+  whole.set_reference("large");
+  using Calls = HeldReads<v1::CatalogueService, v1::FetchVersionResponse>;
+  expect_limits("fetches", v1::kFetchesLimit, v1::kFetchesPerConnectionLimit, [&] {
+    return std::make_unique<Calls>(
+        server_->address(), [&](v1::CatalogueService::Stub& stub, grpc::ClientContext* context) {
+          return stub.FetchVersion(context, whole);
+        });
+  });
+  v1::ReadPiecesRequest parts;
+  for (const storage::Piece& piece : pieces) {
+    parts.add_digests(piece.digest.binary());
   }
-  const std::optional<grpc::Status> refused = watchers.add();
-  ASSERT_TRUE(refused);
-  expect_limit(*refused, "watchers_per_connection_limit");
-  watchers.connect_anew();
-  EXPECT_FALSE(watchers.add()) << "another connection";
+  using PieceCalls = HeldReads<v1::CatalogueService, v1::ReadPiecesResponse>;
+  expect_limits("fetches", v1::kFetchesLimit, v1::kFetchesPerConnectionLimit, [&] {
+    return std::make_unique<PieceCalls>(
+        server_->address(), [&](v1::CatalogueService::Stub& stub, grpc::ClientContext* context) {
+          return stub.ReadPieces(context, parts);
+        });
+  });
+}
+
+TEST_F(LimitsTest, BlobReadsAreLimitedForEachConnectionAndInAll) {
+  v1::ReadRequest request;
+  request.set_digest(scheduler_->blobs().put(std::string(kLargeBytes, 'x')).binary());
+  expect_limits("blob_reads", v1::kBlobReadsLimit, v1::kBlobReadsPerConnectionLimit, [&] {
+    return std::make_unique<HeldReads<v1::BlobService, v1::ReadResponse>>(
+        server_->address(), [&](v1::BlobService::Stub& stub, grpc::ClientContext* context) {
+          return stub.Read(context, request);
+        });
+  });
+}
+
+TEST_F(LimitsTest, UploadsAreLimitedForEachConnectionAndInAll) {
+  expect_limits("uploads", v1::kUploadsLimit, v1::kUploadsPerConnectionLimit,
+                [&] { return std::make_unique<HeldUploads>(server_->address()); });
 }
 
 TEST_F(LimitsTest, ADescriptionABlobAndAMessageHaveASize) {
