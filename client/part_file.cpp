@@ -1,25 +1,17 @@
 #include "client/part_file.h"
 
 #include <cerrno>
-#include <system_error>
 
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/error.h"
+#include "core/descriptor.h"
 
 namespace weft::client {
 
-namespace {
-
-[[noreturn]] void throw_errno(const std::string& what, const std::filesystem::path& path) {
-  throw core::Error(core::Code::kUnavailable, "cannot " + what + " " + path.string() + ": " +
-                                                  std::generic_category().message(errno));
-}
-
-}  // namespace
+using core::throw_errno;
 
 PartFile::PartFile(std::filesystem::path path) : path_(std::move(path)) {
   while (true) {
