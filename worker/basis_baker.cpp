@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include "proto/arrays.h"
@@ -31,19 +32,24 @@ class BasisBaker : public Baker {
     require_shard(shard, shard_count_);
     const transport::Checkpoint checkpoint = stop_point(should_stop);
     const std::uint32_t pixels = spec_.resolution() * spec_.resolution();
-    std::vector<float> distances;
-    distances.reserve(varied_images() * pixels);
+    const float bias = transport::pixel_bias(spec_.resolution());
+    const transport::DistanceTransform transform(spec_.resolution(),
+                                                 transport::kDistanceClamp + bias);
+    std::vector<float> distances(varied_images() * pixels);
+    std::size_t next = 0;
     for (const VisibilityImages& images : visibility_) {
       transport::pass(checkpoint);
       for (std::size_t i = 0; i < images.count(); ++i) {
         if (is_uniform(images.image(i))) {
           continue;
         }
-        std::vector<float> image = transport::signed_distance(images.image(i), spec_.resolution());
+        const auto image = std::span(distances).subspan(next, pixels);
+        transform.measure(images.image(i), image);
         transport::correct_pixel_bias(image, spec_.resolution());
-        for (const float d : image) {
-          distances.push_back(std::clamp(d, -transport::kDistanceClamp, transport::kDistanceClamp));
+        for (float& d : image) {
+          d = std::clamp(d, -transport::kDistanceClamp, transport::kDistanceClamp);
         }
+        next += pixels;
       }
     }
     const transport::DistanceBasis basis = transport::principal_components(
