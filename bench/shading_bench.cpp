@@ -76,6 +76,14 @@ void sample(benchmark::State& state) {
   });
 }
 
+void scatter(benchmark::State& state) {
+  run(state, [](const Workload& w, std::size_t k) {
+    const glm::vec3 throughput(1);
+    return w.bcsdf.scatter(w.omega_o[k], w.bcsdf.odds(w.omega_o[k], throughput), throughput,
+                           w.u[k]);
+  });
+}
+
 void pdf(benchmark::State& state) {
   run(state,
       [](const Workload& w, std::size_t k) { return w.bcsdf.pdf(w.omega_i[k], w.omega_o[k]); });
@@ -114,6 +122,7 @@ void build_sh_table(benchmark::State& state) {
 
 BENCHMARK(evaluate);
 BENCHMARK(sample);
+BENCHMARK(scatter);
 BENCHMARK(pdf);
 BENCHMARK(gamma)->Arg(0)->Arg(1)->Arg(2);
 BENCHMARK(rotate_harmonics);

@@ -10,6 +10,7 @@
 #include "shading/spherical_harmonics.h"
 #include "tests/transport_tiles.h"
 #include "transport/bake_point.h"
+#include "transport/path.h"
 #include "transport/sphere.h"
 #include "transport/transfer.h"
 
@@ -193,7 +194,7 @@ TEST(TransportTransfer, ExitAndLightEstimators_Agree) {
 }
 
 // All entries together: pairs of runs of different estimators differ no more than pairs of runs of
-// the same one.
+// the paper's, whose paths are independent, so that they differ by what their errors say.
 TEST(TransportTransfer, ExitAndLightEstimators_DifferNoMoreThanTwoRuns) {
   const fabric::Tile tile = test::crossed_layers(4, 8, 0.02f, 4);
   const Scene scene(tile);
@@ -209,9 +210,9 @@ TEST(TransportTransfer, ExitAndLightEstimators_DifferNoMoreThanTwoRuns) {
   std::vector<double> mixed;
   std::vector<double> alike;
   for (std::uint64_t pair = 0; pair < kPairs; ++pair) {
-    const Matrix exits = run(Estimator::kExit, 3 * pair);
-    mixed.push_back(chi_square_per_entry(exits, run(Estimator::kLight, 3 * pair + 1)));
-    alike.push_back(chi_square_per_entry(exits, run(Estimator::kExit, 3 * pair + 2)));
+    const Matrix lights = run(Estimator::kLight, 3 * pair);
+    mixed.push_back(chi_square_per_entry(lights, run(Estimator::kExit, 3 * pair + 1)));
+    alike.push_back(chi_square_per_entry(lights, run(Estimator::kLight, 3 * pair + 2)));
   }
   // Student's t with 10 degrees of freedom, one-sided, 0.01.
   const auto [mixed_mean, mixed_variance] = mean_and_variance(mixed);
@@ -219,12 +220,78 @@ TEST(TransportTransfer, ExitAndLightEstimators_DifferNoMoreThanTwoRuns) {
   EXPECT_LT(mixed_mean - alike_mean, 2.764 * std::sqrt((mixed_variance + alike_variance) / kPairs));
 }
 
-TEST(TransportTransfer, StandardErrors_AreThoseOfRepeatedRuns) {
+// What plain paths, which end by roulette alone and take independent numbers, estimate.
+Matrix plain_exits(const Scene& scene, const shading::FibreBcsdf& bcsdf, std::uint32_t order,
+                   std::uint64_t paths) {
+  const std::vector<shading::FibreBcsdf> materials{bcsdf};
+  Matrix matrix;
+  matrix.coefficients = (order + 1) * (order + 1);
+  const std::size_t colour = matrix.coefficients * matrix.coefficients;
+  std::vector<double> sum(3 * colour);
+  std::vector<double> squares(3 * colour);
+  for (std::uint64_t i = 0; i < paths; ++i) {
+    core::Random random(31, 2, i);
+    const std::uint32_t segment = random.below(scene.tile().segment_count());
+    const glm::vec3 arrival = test::random_direction(random);
+    Path path(scene, materials, segment, arrival);
+    bool alive = true;
+    while (alive && path.advance()) {
+      alive = path.scatter(random);
+    }
+    if (!alive || path.vertices() == 0 || !(path.direction().z > 0)) {
+      continue;
+    }
+    const shading::ShVector row = shading::sh_evaluate(arrival);
+    const shading::ShVector light = shading::sh_evaluate(path.direction());
+    for (std::size_t k = 0; k < sum.size(); ++k) {
+      const double value =
+          4 * kPi * static_cast<double>(path.throughput()[static_cast<int>(k / colour)]) *
+          static_cast<double>(row.c[k / matrix.coefficients % matrix.coefficients] *
+                              light.c[k % matrix.coefficients]);
+      sum[k] += value;
+      squares[k] += value * value;
+    }
+  }
+  for (std::size_t k = 0; k < sum.size(); ++k) {
+    matrix.entries.push_back(core::mean_and_error(sum[k], squares[k], static_cast<double>(paths)));
+  }
+  return matrix;
+}
+
+// White fibres of wide lobes, among which paths grow heavy and split: cotton, nearly.
+TEST(TransportTransfer, SplitPaths_EstimateWhatPlainOnesDo) {
+  const fabric::Tile tile = test::crossed_layers(6, 8, 0.03f, 4);
+  const Scene scene(tile);
+  shading::FibreMaterial white;
+  white.c_r = {0.3f, 0.6f, 0.1f};
+  white.c_tt = {0.999f, 0.9f, 0.999f};
+  white.beta_r = 0.04f;
+  white.beta_tt = 0.47f;
+  white.gamma_tt = 0.67f;
+  const shading::FibreBcsdf bcsdf(white);
+  TransferSettings settings;
+  settings.sh_order = 2;
+  settings.seed = 19;
+  const Matrix split = estimate(scene, bcsdf, settings, 40000);
+  const Matrix plain = plain_exits(scene, bcsdf, settings.sh_order, 80000);
+  for (std::size_t i = 0; i < split.entries.size(); ++i) {
+    const double error =
+        std::hypot(split.entries[i].standard_error, plain.entries[i].standard_error);
+    // 243 entries, two-sided, 0.01.
+    EXPECT_LE(std::abs(split.entries[i].mean - plain.entries[i].mean), 4.1 * error) << i;
+  }
+  // A path says more than a plain one: of as many, half would have 1.41 times the error.
+  EXPECT_LT(split.at(0, 0, 0).standard_error, 1.3 * plain.at(0, 0, 0).standard_error);
+}
+
+// The spread of a[0, 0] over seeds, in units of the error that each run states.
+double spread_over_stated_error(Estimator estimator) {
   const fabric::Tile tile = test::crossed_layers(4, 8, 0.02f, 2);
   const Scene scene(tile);
   const shading::FibreBcsdf bcsdf(wide_material());
   TransferSettings settings;
   settings.sh_order = 1;
+  settings.estimator = estimator;
   constexpr int kRuns = 60;
   double sum = 0;
   double squares = 0;
@@ -236,10 +303,20 @@ TEST(TransportTransfer, StandardErrors_AreThoseOfRepeatedRuns) {
     squares += matrix.at(1, 0, 0).mean * matrix.at(1, 0, 0).mean;
     stated += matrix.at(1, 0, 0).standard_error / kRuns;
   }
-  const double spread = std::sqrt((squares - sum * sum / kRuns) / (kRuns - 1));
+  return std::sqrt((squares - sum * sum / kRuns) / (kRuns - 1)) / stated;
+}
+
+TEST(TransportTransfer, StandardErrors_AreThoseOfRepeatedRuns) {
   // chi of 59 degrees of freedom, 99 % two-sided: 0.76 to 1.24.
-  EXPECT_GT(spread / stated, 0.76);
-  EXPECT_LT(spread / stated, 1.24);
+  const double spread = spread_over_stated_error(Estimator::kLight);
+  EXPECT_GT(spread, 0.76);
+  EXPECT_LT(spread, 1.24);
+}
+
+TEST(TransportTransfer, PointsSpreadEvenly_KeepWithinTheStandardErrors) {
+  const double spread = spread_over_stated_error(Estimator::kExit);
+  EXPECT_GT(spread, 0.2);
+  EXPECT_LT(spread, 0.8);  // they gain something, too
 }
 
 TEST(TransportTransfer, AnySplitAtWholeChunks_GivesTheSameBytes) {

@@ -280,7 +280,7 @@ StoppedCell stopped_cell(const std::string& result) {
 }
 
 TEST(WorkerBaker, TransferToAnError_UsesAsManyPathsAsTheCellNeeds) {
-  constexpr double kTarget = 0.0025;
+  constexpr double kTarget = 0.0026;
   const auto baker = make_baker(target_context(kTarget));
   std::set<std::uint64_t> counts;
   for (std::uint64_t cell = 0; cell < target_context(kTarget).shard_count; ++cell) {

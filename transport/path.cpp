@@ -12,7 +12,17 @@ namespace weft::transport {
 
 namespace {
 constexpr float kFar = std::numeric_limits<float>::infinity();
+
+// The same odds, scaled where they sum to more than `most`.
+shading::LobeOdds at_most(shading::LobeOdds odds, float most) {
+  if (const float sum = odds.r + odds.tt; sum > most) {
+    odds.r *= most / sum;
+    odds.tt = most - odds.r;
+  }
+  return odds;
 }
+
+}  // namespace
 
 Path::Path(const Scene& scene, std::span<const shading::FibreBcsdf> materials,
            std::uint32_t segment, glm::vec3 direction)
@@ -45,22 +55,36 @@ bool Path::advance() {
   return true;
 }
 
-bool Path::scatter(core::Random& random) {
-  shading::LobeOdds odds = bcsdf_->odds(omega_o_, throughput_);
-  if (const float sum = odds.r + odds.tt; sum > 1) {
-    odds.r /= sum;
-    odds.tt = 1 - odds.r;
+bool Path::go_on(const shading::LobeOdds& odds, glm::vec3 u) {
+  const shading::BcsdfStep step = bcsdf_->scatter(omega_o_, odds, throughput_, u);
+  if (step.survives) {
+    direction_ = glm::normalize(glm::transpose(frame_) * step.omega_i);
+    throughput_ = step.throughput;
   }
+  return step.survives;
+}
+
+bool Path::scatter(core::Random& random) {
+  const shading::LobeOdds odds = at_most(bcsdf_->odds(omega_o_, throughput_), 1);
   const float u_lobe = random.uniform();
   const float u_theta = random.uniform();
-  const shading::BcsdfStep step =
-      bcsdf_->scatter(omega_o_, odds, throughput_, {u_lobe, u_theta, random.uniform()});
-  if (!step.survives) {
-    return false;
+  return go_on(odds, {u_lobe, u_theta, random.uniform()});
+}
+
+bool Path::scatter(glm::vec3 u, float worth, core::Random& random, std::vector<Path>& others) {
+  shading::LobeOdds odds = bcsdf_->odds(omega_o_, throughput_);
+  odds.r *= worth;
+  odds.tt *= worth;
+  odds = at_most(odds, static_cast<float>(kMostOthers + 1 - std::min(kMostOthers, others.size())));
+  // One number picks all, evenly spaced: neither lobe has more or fewer than it should by one.
+  for (float u_lobe = u.x + 1; u_lobe < odds.r + odds.tt; u_lobe += 1) {
+    const float u_theta = random.uniform();
+    Path other = *this;
+    if (other.go_on(odds, {u_lobe, u_theta, random.uniform()})) {
+      others.push_back(other);
+    }
   }
-  direction_ = glm::normalize(glm::transpose(frame_) * step.omega_i);
-  throughput_ = step.throughput;
-  return true;
+  return go_on(odds, u);
 }
 
 glm::vec3 Path::reflected(glm::vec3 towards_light) const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
@@ -32,6 +33,14 @@ class Path {
   // keeps the expectation. False when the path ends here. REQUIRES: advance() returned true.
   bool scatter(core::Random& random);
 
+  // The same by the numbers `u`, each in [0, 1), for a path that may go on as several: as many as
+  // its throughput times `worth` says, rounded at random. The further ones, which draw their
+  // directions from `random`, are appended to `others`, up to kMostOthers there; none is
+  // heavier than 1 / worth by more than its lobe's width makes it. Keeps the expectation of their
+  // sum for any worth above 0.
+  bool scatter(glm::vec3 u, float worth, core::Random& random, std::vector<Path>& others);
+  static constexpr std::size_t kMostOthers = 64;
+
   // S(towards_light, -direction) cos(theta) at the fibre just met, zero when another fibre hides
   // the light. REQUIRES: advance() returned true.
   [[nodiscard]] glm::vec3 reflected(glm::vec3 towards_light) const;
@@ -39,11 +48,14 @@ class Path {
   [[nodiscard]] glm::vec3 direction() const { return direction_; }
   [[nodiscard]] glm::vec3 throughput() const { return throughput_; }
   [[nodiscard]] std::uint32_t vertices() const { return vertices_; }
-  // Across and along the cloth, from the start to the last fibre met; and that one's height.
+  // Across and along the cloth, from the start to the last fibre met; and the height of where that
+  // was met, before the first one of the start.
   [[nodiscard]] glm::dvec2 travelled_mm() const { return travelled_mm_; }
   [[nodiscard]] double height_mm() const { return static_cast<double>(position_mm_.z); }
 
  private:
+  bool go_on(const shading::LobeOdds& odds, glm::vec3 u);
+
   const Scene& scene_;
   std::span<const shading::FibreBcsdf> materials_;
   glm::vec3 position_mm_{0, 0, 0};

@@ -46,13 +46,13 @@ std::vector<std::uint32_t> seen_segments(const Scene& scene, std::uint32_t rays_
   return seen;
 }
 
-std::uint32_t CellSegments::draw(core::Random& random) const {
+std::uint32_t CellSegments::at(std::uint32_t share) const {
   if (weight_sums.empty()) {
-    return segments[random.below(static_cast<std::uint32_t>(segments.size()))];
+    return segments[(std::uint64_t{share} * segments.size()) >> 32];
   }
-  const std::uint32_t drawn = random.below(weight_sums.back());
-  const auto at = std::upper_bound(weight_sums.begin(), weight_sums.end(), drawn);
-  return segments[static_cast<std::size_t>(at - weight_sums.begin())];
+  const std::uint64_t drawn = (std::uint64_t{share} * weight_sums.back()) >> 32;
+  const auto found = std::upper_bound(weight_sums.begin(), weight_sums.end(), drawn);
+  return segments[static_cast<std::size_t>(found - weight_sums.begin())];
 }
 
 std::vector<CellSegments> segments_by_cell(std::span<const std::uint32_t> cell_of_segment,

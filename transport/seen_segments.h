@@ -30,7 +30,9 @@ struct CellSegments {
   std::vector<std::uint32_t> weight_sums;
 
   // REQUIRES: `segments` is not empty.
-  [[nodiscard]] std::uint32_t draw(core::Random& random) const;
+  [[nodiscard]] std::uint32_t draw(core::Random& random) const { return at(random.bits()); }
+  // The one at `share` in units of 2^-32 of the sum of the weights. REQUIRES: as draw().
+  [[nodiscard]] std::uint32_t at(std::uint32_t share) const;
 };
 
 // The segments of each cell, in order, weighted by `seen`. Throws core::Error(kDataLoss) when the

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <numbers>
+#include <vector>
 
 #include "core/check.h"
 #include "core/random.h"
+#include "core/sobol.h"
 #include "transport/path.h"
 #include "transport/sh_chunk.h"
 #include "transport/sphere.h"
@@ -15,40 +17,89 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-// What one path estimates: `weight` times Y_j0(light) Y_j1(arrival).
-struct Estimate {
-  glm::vec3 weight{0, 0, 0};
-  glm::vec3 light{0, 0, 1};
+// How many times as much a path at the top of the cloth is worth as one at its bottom, but one:
+// light comes from above. Measured: 0 takes 2 to 10 % more time for the same variance, and 1 to 3
+// make no difference.
+constexpr float kWorthOfHeight = 2;
+
+// What is kept from path to path, for the sake of its memory.
+struct Workspace {
+  std::vector<Path> pending;        // parts of the path that have yet to be followed
+  std::vector<LightSample> lights;  // that it found
 };
 
+// Worth of a path at a height over that of its start.
+class Worth {
+ public:
+  Worth(const fabric::Tile& tile, const TransferSettings& settings, double start_mm)
+      : bottom_mm_(tile.z_min_mm),
+        slope_(settings.lights_below || !(tile.z_max_mm > tile.z_min_mm)
+                   ? 0
+                   : kWorthOfHeight / (tile.z_max_mm - tile.z_min_mm)),
+        of_start_(absolute(start_mm)) {}
+  [[nodiscard]] float at(double height_mm) const { return absolute(height_mm) / of_start_; }
+
+ private:
+  // Surfaces bulge out of the slab by a radius, which is no reason for a worth below 1.
+  [[nodiscard]] float absolute(double height_mm) const {
+    return 1 + slope_ * std::max(0.0f, static_cast<float>(height_mm) - bottom_mm_);
+  }
+
+  float bottom_mm_;
+  float slope_;
+  float of_start_;
+};
+
+glm::vec3 three_numbers(core::Random& random) {
+  const float a = random.uniform();
+  const float b = random.uniform();
+  return {a, b, random.uniform()};
+}
+
 // E[4 pi tau Y(exit) Y(omega_1)], omega_1 uniform over the sphere and exit the direction in which
-// the path leaves after n >= 1 scatterings: that it leaves is the light's visibility.
-Estimate exit_estimate(Path& path, const TransferSettings& settings, core::Random& random) {
-  while (path.advance()) {
-    if (path.vertices() > settings.max_path_length || !path.scatter(random)) {
-      return {};
+// the path leaves after n >= 1 scatterings: that it leaves is the light's visibility. `first`
+// serves the first scattering.
+void find_exits(const Path& start, glm::vec3 first, const TransferSettings& settings,
+                const Worth& worth, core::Random& random, Workspace& work) {
+  work.pending.clear();
+  work.pending.push_back(start);
+  while (!work.pending.empty()) {
+    Path path = work.pending.back();
+    work.pending.pop_back();
+    bool alive = true;
+    while (alive && path.advance()) {
+      const glm::vec3 u = path.vertices() == 1 ? first : three_numbers(random);
+      alive = path.vertices() <= settings.max_path_length &&
+              path.scatter(u, worth.at(path.height_mm()), random, work.pending);
+    }
+    if (alive && (path.vertices() > 0 || settings.with_direct) &&
+        (settings.lights_below || path.direction().z > 0)) {
+      work.lights.push_back({4 * kPi * path.throughput(), path.direction()});
     }
   }
-  const bool counts = (path.vertices() > 0 || settings.with_direct) &&
-                      (settings.lights_below || path.direction().z > 0);
-  return counts ? Estimate{4 * kPi * path.throughput(), path.direction()} : Estimate{};
 }
 
 // (2 pi)(4 pi) sum over vertices of tau S(omega_0, -omega_n) cos(theta_0) V(omega_0).
-Estimate light_estimate(Path& path, const TransferSettings& settings, core::Random& random) {
+void connect_light(Path path, const TransferSettings& settings, core::Random& random,
+                   Workspace& work) {
   const float u_z = random.uniform();
-  Estimate estimate;
-  estimate.light = uniform_direction(settings.lights_below ? u_z : 0.5f * u_z, random.uniform());
+  LightSample light;
+  light.direction = uniform_direction(settings.lights_below ? u_z : 0.5f * u_z, random.uniform());
   const float density = settings.lights_below ? 1 / (4 * kPi) : 1 / (2 * kPi);
   while (path.advance() && path.vertices() <= settings.max_path_length) {
-    estimate.weight += path.throughput() * path.reflected(estimate.light);
+    light.weight += path.throughput() * path.reflected(light.direction);
     if (!path.scatter(random)) {
       break;
     }
   }
-  estimate.weight *= 4 * kPi / density;
-  return estimate;
+  light.weight *= 4 * kPi / density;
+  if (light.weight != glm::vec3(0, 0, 0)) {
+    work.lights.push_back(light);
+  }
 }
+
+// In [0, 1), 24 bits, as core::Random::uniform().
+float unit(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
 
 }  // namespace
 
@@ -59,20 +110,29 @@ TransferSums transfer_sums(const Scene& scene, std::span<const shading::FibreBcs
   CHECK(paths.segments != nullptr && !paths.segments->segments.empty());
   CHECK_EQ(materials.size(), scene.tile().material_names.size());
   ShChunk chunk(settings.sh_order);
+  Workspace work;
+  const core::SobolPoints points(settings.seed, paths.cell);
   TransferSums sums;
   sums.paths = paths.count;
   sums.sum.assign(chunk.size(), 0);
   sums.sum_of_squares.assign(chunk.size(), 0);
   for (std::uint64_t i = paths.first; i < paths.first + paths.count; ++i) {
     core::Random random(settings.seed, paths.cell, i);
-    const std::uint32_t segment = paths.segments->draw(random);
-    const float u_z = random.uniform();
-    const glm::vec3 arrival = uniform_direction(u_z, random.uniform());
-    Path path(scene, materials, segment, arrival);
-    const Estimate estimate = settings.estimator == Estimator::kExit
-                                  ? exit_estimate(path, settings, random)
-                                  : light_estimate(path, settings, random);
-    chunk.add(estimate.weight, arrival, estimate.light);
+    work.lights.clear();
+    glm::vec3 arrival;
+    if (settings.estimator == Estimator::kExit) {
+      const core::SobolPoints::Point u = points.point(static_cast<std::uint32_t>(i));
+      arrival = uniform_direction(unit(u[0]), unit(u[1]));
+      const Path start(scene, materials, paths.segments->at(u[2]), arrival);
+      find_exits(start, {unit(u[3]), unit(u[4]), unit(u[5])}, settings,
+                 Worth(scene.tile(), settings, start.height_mm()), random, work);
+    } else {
+      const std::uint32_t segment = paths.segments->draw(random);
+      const float u_z = random.uniform();
+      arrival = uniform_direction(u_z, random.uniform());
+      connect_light(Path(scene, materials, segment, arrival), settings, random, work);
+    }
+    chunk.add(arrival, work.lights);
     if ((i + 1) % kTransferChunkPaths == 0 || i + 1 == paths.first + paths.count) {
       chunk.flush(sums.sum, sums.sum_of_squares);
       pass(checkpoint);

@@ -15,9 +15,11 @@ namespace weft::transport {
 // T( omega_0, omega_1, x), radiance arriving at x from omega_1 per unit of distant light from
 // omega_0 after at least one scattering (Khungurn et al. 2017, section 4.2).
 enum class Estimator {
-  // The path's own exit is its light: 4 pi tau Y_j0(exit) Y_j1(omega_1). No shadow rays; the light
-  // is drawn from the density that the cloth transports: less variance per path, and no shadow
-  // rays.
+  // The path's own exit is its light: 4 pi tau Y_j0(exit) Y_j1(omega_1). The light is drawn from
+  // the density that the cloth transports, and there are no shadow rays. Paths split where they
+  // have grown heavy or come near the light, and end where they are light or far from it; a path's
+  // estimate is the sum over its exits. Segment, omega_1 and the first scattering are points of a
+  // scrambled Sobol sequence, whose number is the path's.
   kExit,
   // The paper's: one light per path, uniform over the upper hemisphere, connected to every vertex.
   kLight,
@@ -48,7 +50,9 @@ inline constexpr std::uint64_t kTransferChunkPaths = 256;
 // (core/moments.h), [3, (order+1)^2 (j1, incoming), (order+1)^2 (j0, light)]. Chunks of 256 paths,
 // aligned to the path's number, are summed in float in order and then added in fixed point: the
 // sums of [0, n) are those of [0, m) plus [m, n) to the bit for every multiple m of 256. A chunk's
-// sum of squares saturates at 2^25, which takes a path whose estimate exceeds 5000.
+// sum of squares saturates at 2^25, which takes a path whose estimate exceeds 5000. Standard errors
+// that follow from the squares take paths for independent: the exit estimator's points are spread
+// more evenly than that, so that its mean is as close to the truth as they say, or closer.
 struct TransferSums {
   std::uint64_t paths = 0;
   std::vector<std::int64_t> sum;
