@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <immintrin.h>
+
 namespace weft::transport {
 
 inline constexpr std::uint32_t kMaxMaskResolution = 1024;
@@ -57,9 +59,18 @@ class CoverMask {
 
   // Whether the region has an uncovered pixel.
   [[nodiscard]] bool is_open(const ImageRegion& region) const {
+    const std::int32_t first = region.first_column;
+    const std::int32_t last = region.last_column;
+    const std::int32_t n = resolution_;
     for (std::size_t w = 0; w < words_; ++w) {
       const std::uint64_t rows = rows_of(region, w);
-      if (rows != 0 && (rows & rows_open_somewhere(region, w)) != 0) {
+      if (rows == 0) {
+        continue;
+      }
+      const std::uint64_t* open = &open_[w * static_cast<std::size_t>(n)];
+      if (is_open_between(open, std::max(first, 0), std::min(last, n - 1), rows) ||
+          (first < 0 && is_open_between(open, first + n, std::min(last + n, n - 1), rows)) ||
+          (last >= n && is_open_between(open, std::max(first - n, 0), last - n, rows))) {
         return true;
       }
     }
@@ -74,22 +85,21 @@ class CoverMask {
   void cover_all() { std::fill(open_.begin(), open_.end(), 0); }
 
  private:
-  [[nodiscard]] std::uint64_t rows_open_somewhere(const ImageRegion& region,
-                                                  std::size_t word) const {
-    const std::uint64_t* open = &open_[word * static_cast<std::size_t>(resolution_)];
-    const std::int32_t first = region.first_column;
-    const std::int32_t last = region.last_column;
-    std::uint64_t any = 0;
-    for (std::int32_t c = std::max(first, 0); c <= std::min(last, resolution_ - 1); ++c) {
-      any |= open[c];
+  // Whether one of the rows is open in one of columns first ... last.
+  [[nodiscard]] static bool is_open_between(const std::uint64_t* open, std::int32_t first,
+                                            std::int32_t last, std::uint64_t rows) {
+    __m256i any = _mm256_setzero_si256();
+    std::int32_t c = first;
+    for (; c + 3 <= last; c += 4) {
+      any = _mm256_or_si256(any, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(open + c)));
     }
-    for (std::int32_t c = first; c <= std::min(last, -1); ++c) {
-      any |= open[c + resolution_];
+    if (c <= last) {
+      const __m256i beyond = _mm256_set1_epi64x(last - c + 1);
+      const __m256i wanted = _mm256_cmpgt_epi64(beyond, _mm256_setr_epi64x(0, 1, 2, 3));
+      any = _mm256_or_si256(
+          any, _mm256_maskload_epi64(reinterpret_cast<const long long*>(open + c), wanted));
     }
-    for (std::int32_t c = std::max(first, resolution_); c <= last; ++c) {
-      any |= open[c - resolution_];
-    }
-    return any;
+    return _mm256_testz_si256(any, _mm256_set1_epi64x(static_cast<long long>(rows))) == 0;
   }
 
   std::int32_t resolution_;
