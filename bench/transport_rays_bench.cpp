@@ -19,6 +19,7 @@
 #include "fabric/description.h"
 #include "tests/ray_agreement.h"
 #include "transport/embree_scene.h"
+#include "transport/float_mode.h"
 #include "transport/scene.h"
 #include "transport/wide.h"
 
@@ -126,6 +127,7 @@ bool agree(const Cloth& on, const std::vector<test::TracedRay>& rays) {
 
 template <bool kClosest>
 void rays(benchmark::State& state) {
+  const transport::FlushDenormals flush;  // as bakers do
   const Cloth& on = cloth(state.range(0));
   const std::vector<test::TracedRay> all = some_rays(on, state.range(1) != 0);
   if (!agree<kClosest>(on, all)) {

@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
@@ -74,7 +75,7 @@ std::vector<test::TracedRay> rays_of_all_sorts(const Scene& scene) {
   for (std::size_t i = 0; i < walked; i += 7) {
     test::TracedRay ray = rays[i];
     const int axis = static_cast<int>(i % 3);
-    ray.direction = glm::vec3(0);
+    ray.direction = glm::vec3(i % 5 == 0 ? -0.0f : 0.0f);
     ray.direction[axis] = i % 2 == 0 ? 1.0f : -1.0f;
     rays.push_back(ray);
     ray.origin_mm += glm::vec3{31, -17, 5};
@@ -119,6 +120,23 @@ TEST(TransportRayKernel, WideAndPortable_GiveTheSameBits) {
     }
     EXPECT_GT(hits, 500);
   }
+}
+
+TEST(TransportRayKernel, DirectionsOfNegativeZero_AreThoseOfZero) {
+  const fabric::Tile tile = test::crossed_layers(4, 8, 0.02f, 6);
+  const Scene scene(tile, false);
+  int hits = 0;
+  for (const test::TracedRay& ray : rays_of_all_sorts(scene)) {
+    const glm::vec3 flat =
+        std::abs(ray.direction.x) < 0.5f ? glm::vec3{0, 0.6f, 0.8f} : glm::vec3{0.6f, 0, 0.8f};
+    const glm::vec3 other{flat.x == 0 ? -0.0f : flat.x, flat.y == 0 ? -0.0f : flat.y, flat.z};
+    const auto one = scene.closest(ray.origin_mm, flat, kFar, ray.ignored);
+    const auto two = scene.closest(ray.origin_mm, other, kFar, ray.ignored);
+    ASSERT_EQ(one.has_value(), two.has_value());
+    EXPECT_TRUE(!one || (one->t_mm == two->t_mm && one->segment == two->segment));
+    hits += one ? 1 : 0;
+  }
+  EXPECT_GT(hits, 100);
 }
 
 // The tree with one leaf alone in it.

@@ -27,6 +27,13 @@ struct Branch {
   std::uint32_t depth = 0;
 };
 
+// What a branch costs in i + 1 places of a node, and how many of these its left child has; zero:
+// the branch is one child itself. Of the last entry the left child's share always counts.
+struct Plan {
+  std::array<float, kTreeWidth> steps{};
+  std::array<std::uint8_t, kTreeWidth> left_places{};
+};
+
 struct Bin {
   Box box;
   std::uint32_t count = 0;
@@ -101,6 +108,7 @@ class Builder {
 
   BoxTree build() {
     grow_branches();
+    plan_nodes();
     tree_.bounds = branches_[0].box;
     tree_.root = to_child(0);
     // Nodes are made as they are met: a child is known before the subtree below it is.
@@ -167,36 +175,70 @@ class Builder {
     return static_cast<std::uint32_t>(pending_.size() - 1);
   }
 
-  void make_node(std::uint32_t index, std::uint32_t branch) {
-    const std::uint32_t first = branches_[branch].children;
-    std::array<std::uint32_t, kTreeWidth> members{first, first + 1};
-    std::size_t count = 2;
-    while (count < kTreeWidth) {
-      std::size_t largest = kTreeWidth;
-      float area = -1;
-      for (std::size_t i = 0; i < count; ++i) {
-        const Branch& member = branches_[members[i]];
-        if (member.children != 0 && member.box.half_area() > area) {
-          area = member.box.half_area();
-          largest = i;
+  // From the leaves up: the least expected number of steps below a branch, per area, when it may
+  // take up to 1, 2, ..., 16 places of a node. It takes one as a leaf or a node of its own, or its
+  // children share the places. A step is a node or a leaf that a ray meets, which it does in
+  // proportion to the surface area.
+  void plan_nodes() {
+    plans_.resize(branches_.size());
+    for (std::size_t b = branches_.size(); b-- > 0;) {
+      const Branch& branch = branches_[b];
+      Plan& plan = plans_[b];
+      const float area = branch.box.half_area();
+      if (branch.children == 0) {
+        plan.steps.fill(area);
+        continue;
+      }
+      const Plan& left = plans_[branch.children];
+      const Plan& right = plans_[branch.children + 1];
+      for (std::size_t places = 2; places <= kTreeWidth; ++places) {
+        float& least = plan.steps[places - 1];
+        least = std::numeric_limits<float>::infinity();
+        for (std::size_t k = 1; k < places; ++k) {
+          const float steps = left.steps[k - 1] + right.steps[places - k - 1];
+          if (steps < least) {
+            least = steps;
+            plan.left_places[places - 1] = static_cast<std::uint8_t>(k);
+          }
         }
       }
-      if (largest == kTreeWidth) {
-        break;
+      plan.steps[0] = area + plan.steps[kTreeWidth - 1];
+      for (std::size_t i = 1; i + 1 < kTreeWidth; ++i) {
+        if (plan.steps[0] < plan.steps[i]) {
+          plan.steps[i] = plan.steps[0];
+          plan.left_places[i] = 0;
+        }
       }
-      const std::uint32_t children = branches_[members[largest]].children;
-      members[largest] = children;
-      members[count++] = children + 1;
     }
+  }
+
+  // Adds the children of a node that stand for a branch in this many places.
+  void gather(std::uint32_t branch, std::size_t places, std::vector<std::uint32_t>& members) const {
+    const std::size_t left = plans_[branch].left_places[places - 1];
+    if (left == 0) {
+      members.push_back(branch);
+      return;
+    }
+    gather(branches_[branch].children, left, members);
+    gather(branches_[branch].children + 1, places - left, members);
+  }
+
+  void make_node(std::uint32_t index, std::uint32_t branch) {
+    const std::uint32_t children = branches_[branch].children;
+    const std::size_t left = plans_[branch].left_places[kTreeWidth - 1];
+    std::vector<std::uint32_t> members;
+    gather(children, left, members);
+    gather(children + 1, kTreeWidth - left, members);
     CHECK_EQ(std::size_t{index}, tree_.nodes.size());
     BoxNode& node = tree_.nodes.emplace_back();
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < members.size(); ++i) {
       node.set(i, branches_[members[i]].box, to_child(members[i]));
     }
   }
 
   std::span<const Box> boxes_;
   std::vector<Branch> branches_;
+  std::vector<Plan> plans_;
   std::vector<std::uint32_t> pending_;  // branches of the nodes, by the nodes' indices
   BoxTree tree_;
 };

@@ -70,33 +70,28 @@ WEFT_KERNEL Entries enter_capsules(const CapsuleBlock& block, Vector origin, Vec
   const Floats root2 = subtract_product(sine2 * radius2, passing, passing);
   const Mask parallel = is_less(sine2, all(kParallel));
   const Mask near = is_at_most(all(0), root2) | parallel;
-  if (bits(near) == 0) {
-    return {near, t_nearest};
-  }
   // Where it enters the endless cylinder: t sin^2 = -p . (d - (d . u) u) - root.
   const Floats cosine = dot(d, u);
   const Floats p_along = dot(p, u);
   const Floats b = subtract_product(dot(p, d), cosine, p_along);
-  const Floats t_side = (all(0) - b - square_root(greatest(root2, all(0)))) / sine2;
-  const Floats along = multiply_add(t_side, cosine, p_along);
+  const Floats to_side = all(0) - b - square_root(greatest(root2, all(0)));
+  const Floats t_side = to_side / sine2;
+  // How far along the axis that is, times sin^2: the division need not be waited for.
+  const Floats along = multiply_add(to_side, cosine, p_along * sine2);
   const Floats half_length = load(block.half_length.data());
-  const Mask by_side = without(is_at_most(magnitude(along), half_length), parallel);
-  const Mask by_end = without(near, by_side);
-  Mask met = near & by_side;
-  Floats t_local = t_side;
-  if (bits(by_end) != 0) {
-    // Into the ball at the end before which it enters the cylinder.
-    const Floats side = choose(parallel, all(0) - cosine, along);
-    const Vector from_end = subtract_product(p, with_sign(half_length, side), u);
-    const Floats back = dot(from_end, d);
-    const Vector off = subtract_product(from_end, back, d);
-    const Floats h2 = radius2 - dot(off, off);
-    const Floats t_end = all(0) - back - square_root(greatest(h2, all(0)));
-    met = met | (by_end & is_at_most(all(0), h2));
-    t_local = choose(by_end, t_end, t_side);
-  }
+  const Mask by_side = without(is_at_most(magnitude(along), half_length * sine2), parallel);
+  // Into the ball at the end before which it enters the cylinder. Nearly every leaf has lanes of
+  // both sorts: to branch on it costs more than it saves.
+  const Floats side = choose(parallel, all(0) - cosine, along);
+  const Vector from_end = subtract_product(p, with_sign(half_length, side), u);
+  const Floats back = dot(from_end, d);
+  const Vector off = subtract_product(from_end, back, d);
+  const Floats h2 = radius2 - dot(off, off);
+  const Floats t_end = all(0) - back - square_root(greatest(h2, all(0)));
+  const Mask by_end = without(near, by_side) & is_at_most(all(0), h2);
+  const Floats t_local = choose(by_side, t_side, t_end);
   const Floats t = t_nearest + t_local;
-  return {met & is_at_most(all(0), t) & is_at_most(t, t_max), t};
+  return {((near & by_side) | by_end) & is_at_most(all(0), t) & is_at_most(t, t_max), t};
 }
 
 // Lanes whose capsule holds the origin.
@@ -124,14 +119,21 @@ class Search {
       // Near enough to infinite where the direction is zero, but times zero it is no NaN.
       const float d = ray.direction[axis];
       inverse[axis] = 1 / (std::abs(d) > kLeast ? d : std::copysign(kLeast, d));
-      near_[static_cast<std::size_t>(axis)] = static_cast<std::size_t>(d < 0 ? axis + 3 : axis);
+      near_[static_cast<std::size_t>(axis)] =
+          static_cast<std::size_t>(inverse[axis] < 0 ? axis + 3 : axis);
     }
     inverse_ = all(inverse);
   }
 
   WEFT_KERNEL TreeHit run() {
-    enter(tree_.top, 0);
+    // The central block, where the ray starts, is entered at once.
     std::uint32_t current = FibreTree::kBlocks / 2;
+    const std::uint32_t home = tree_.top.child[current];
+    const bool is_node = (home & BoxTree::kLeaf) == 0;
+    enter(tree_.top, 0, is_node ? ~(1U << current) : ~0U);
+    if (is_node) {
+      enter(tree_.nodes[home & kIndexBits], current << FibreTree::kBlockShift, ~0U);
+    }
     while (depth_ > 0) {
       const std::uint64_t next = stack_[--depth_];
       const float entry = std::bit_cast<float>(static_cast<std::uint32_t>(next >> 32U));
@@ -144,9 +146,9 @@ class Search {
         current = block;
         origin_ = all(ray_.origin_mm - tree_.step_mm[block]);
       }
-      const std::uint32_t index = child & ((1U << FibreTree::kBlockShift) - 1);
+      const std::uint32_t index = child & kIndexBits;
       if ((child & BoxTree::kLeaf) == 0) {
-        enter(tree_.nodes[index], block << FibreTree::kBlockShift);
+        enter(tree_.nodes[index], block << FibreTree::kBlockShift, ~0U);
       } else if (meets(tree_.leaves[index], block, entry)) {
         break;
       }
@@ -156,9 +158,10 @@ class Search {
 
  private:
   static constexpr float kLeast = 1e-18f;
+  static constexpr std::uint32_t kIndexBits = (1U << FibreTree::kBlockShift) - 1;
 
-  // Puts the children that the ray meets on the stack, the nearest on top.
-  WEFT_KERNEL void enter(const BoxNode& node, std::uint32_t block_bits) {
+  // Puts those of the children in `lanes` that the ray meets on the stack, the nearest on top.
+  WEFT_KERNEL void enter(const BoxNode& node, std::uint32_t block_bits, std::uint32_t lanes) {
     const Vector near{load(node.bounds[near_[0]].data()), load(node.bounds[near_[1]].data()),
                       load(node.bounds[near_[2]].data())};
     const Vector far{load(node.bounds[3 - near_[0]].data()), load(node.bounds[5 - near_[1]].data()),
@@ -169,24 +172,8 @@ class Search {
     const Floats t_out =
         least(least((far.x - origin_.x) * inverse_.x, (far.y - origin_.y) * inverse_.y),
               least((far.z - origin_.z) * inverse_.z, all(best_.t_mm)));
-    std::uint32_t met = bits(is_at_most(t_in, t_out));
-    if (met == 0) {
-      return;
-    }
-    alignas(64) std::array<float, kTreeWidth> entry;
-    store(entry.data(), t_in);
-    const std::size_t bottom = depth_;
-    for (; met != 0; met &= met - 1) {
-      const auto lane = static_cast<std::size_t>(std::countr_zero(met));
-      const std::uint64_t waiting = std::uint64_t{std::bit_cast<std::uint32_t>(entry[lane])}
-                                        << 32U |
-                                    (node.child[lane] | block_bits);
-      std::size_t at = depth_++;
-      for (; at > bottom && stack_[at - 1] < waiting; --at) {
-        stack_[at] = stack_[at - 1];
-      }
-      stack_[at] = waiting;
-    }
+    const std::uint32_t met = bits(is_at_most(t_in, t_out)) & lanes;
+    depth_ += push_nearest_last(stack_.data() + depth_, met, t_in, node.child.data(), block_bits);
   }
 
   // Tests a leaf; true when the search is over.

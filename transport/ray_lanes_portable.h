@@ -4,6 +4,9 @@
 // ray_lanes_wide.h names too; ray_kernel_text.h is written in these words. Each operation rounds
 // once, as IEEE 754 says, so that both give the same bits.
 
+#include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include <immintrin.h>
@@ -102,6 +105,26 @@ inline std::uint32_t bits_of_equal(const std::uint32_t* p, std::uint32_t value) 
   const auto* from = reinterpret_cast<const __m256i*>(p);
   return bits({_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_load_si256(from), wanted)),
                _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_load_si256(from + 1), wanted))});
+}
+
+// Writes (bits of t << 32 | child | also) of each lane in `lanes`, the least last; t must not be
+// negative. Returns how many. Up to four words behind them may be written over.
+inline std::size_t push_nearest_last(std::uint64_t* stack, std::uint32_t lanes, Floats t,
+                                     const std::uint32_t* child, std::uint32_t also) {
+  alignas(64) std::array<float, 16> distance;
+  store(distance.data(), t);
+  std::size_t count = 0;
+  for (; lanes != 0; lanes &= lanes - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(lanes));
+    const std::uint64_t waiting =
+        std::uint64_t{std::bit_cast<std::uint32_t>(distance[lane])} << 32U | (child[lane] | also);
+    std::size_t at = count++;
+    for (; at > 0 && stack[at - 1] < waiting; --at) {
+      stack[at] = stack[at - 1];
+    }
+    stack[at] = waiting;
+  }
+  return count;
 }
 
 }  // namespace

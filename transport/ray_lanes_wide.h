@@ -2,6 +2,9 @@
 
 // The words of ray_lanes_portable.h for one register of AVX-512. Every function carries WEFT_WIDE.
 
+#include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include <immintrin.h>
@@ -67,6 +70,50 @@ WEFT_LANES Floats choose(Mask mask, Floats yes, Floats no) {
 WEFT_LANES std::uint32_t bits(Mask mask) { return mask.v; }
 WEFT_LANES std::uint32_t bits_of_equal(const std::uint32_t* p, std::uint32_t value) {
   return _mm512_cmpeq_epi32_mask(_mm512_load_si512(p), _mm512_set1_epi32(static_cast<int>(value)));
+}
+
+// Four words, the greatest first: a bitonic network (Batcher 1968).
+WEFT_LANES __m256i greatest_first(__m256i words) {
+  __m256i other = _mm256_permutex_epi64(words, 0b10'11'00'01);
+  words = _mm256_mask_blend_epi64(0b1010, _mm256_max_epu64(words, other),
+                                  _mm256_min_epu64(words, other));
+  other = _mm256_permutex_epi64(words, 0b00'01'10'11);
+  words = _mm256_mask_blend_epi64(0b1100, _mm256_max_epu64(words, other),
+                                  _mm256_min_epu64(words, other));
+  other = _mm256_permutex_epi64(words, 0b10'11'00'01);
+  return _mm256_mask_blend_epi64(0b1010, _mm256_max_epu64(words, other),
+                                 _mm256_min_epu64(words, other));
+}
+
+WEFT_LANES std::size_t push_nearest_last(std::uint64_t* stack, std::uint32_t lanes, Floats t,
+                                         const std::uint32_t* child, std::uint32_t also) {
+  const auto mask = static_cast<__mmask16>(lanes);
+  const auto count = static_cast<std::size_t>(std::popcount(lanes));
+  const __m512i distance = _mm512_maskz_compress_epi32(mask, _mm512_castps_si512(t.v));
+  const __m512i named =
+      _mm512_or_si512(_mm512_load_si512(child), _mm512_set1_epi32(static_cast<int>(also)));
+  const __m512i children = _mm512_maskz_compress_epi32(mask, named);
+  if (count <= 4) {
+    // Places without a lane hold zero and come behind the others.
+    const __m256i high = _mm256_cvtepu32_epi64(_mm512_maskz_extracti32x4_epi32(0xf, distance, 0));
+    const __m256i low = _mm256_cvtepu32_epi64(_mm512_maskz_extracti32x4_epi32(0xf, children, 0));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(stack),
+                        greatest_first(_mm256_or_si256(_mm256_slli_epi64(high, 32), low)));
+    return count;
+  }
+  alignas(64) std::array<std::uint32_t, 16> distances;
+  alignas(64) std::array<std::uint32_t, 16> names;
+  _mm512_store_si512(distances.data(), distance);
+  _mm512_store_si512(names.data(), children);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint64_t waiting = std::uint64_t{distances[i]} << 32U | names[i];
+    std::size_t at = i;
+    for (; at > 0 && stack[at - 1] < waiting; --at) {
+      stack[at] = stack[at - 1];
+    }
+    stack[at] = waiting;
+  }
+  return count;
 }
 
 }  // namespace
