@@ -179,35 +179,31 @@ DistanceTransform::DistanceTransform(std::uint32_t resolution, float limit)
   }
 }
 
-void DistanceTransform::nearest_in_rows(std::span<const std::uint8_t> bits,
-                                        std::span<float> nearest) const {
-  const std::size_t n = resolution_;
-  for (std::size_t r = 0; r < n; ++r) {
-    const auto row = nearest.subspan(r * n, n);
-    const auto bytes = bits.subspan(r * n / 8, n / 8);
-    std::size_t first_edge = n;
-    std::size_t last_edge = 0;
-    unsigned before = bytes[n / 8 - 1] >> 7;  // the pixel before, round the circle
-    for (std::size_t b = 0; b < n / 8; ++b) {
-      const unsigned byte = bytes[b];
-      for (unsigned edges = (byte ^ (byte << 1 | before)) & 0xffU; edges != 0; edges &= edges - 1) {
-        const std::size_t edge = 8 * b + static_cast<std::size_t>(std::countr_zero(edges));
-        if (first_edge == n) {
-          first_edge = edge;
-        } else {  // the run that ends here has the value that does not begin here
-          const bool begins_visible = (byte >> (edge % 8) & 1U) != 0;
-          fill_run(last_edge, edge - last_edge, begins_visible ? -1.0f : 1.0f, columns_apart_, row);
-        }
-        last_edge = edge;
+void DistanceTransform::nearest_in_row(std::span<const std::uint8_t> bits,
+                                       std::span<float> row) const {
+  const std::size_t n = row.size();
+  std::size_t first_edge = n;
+  std::size_t last_edge = 0;
+  unsigned before = bits[n / 8 - 1] >> 7;  // the pixel before, round the circle
+  for (std::size_t b = 0; b < n / 8; ++b) {
+    const unsigned byte = bits[b];
+    for (unsigned edges = (byte ^ (byte << 1 | before)) & 0xffU; edges != 0; edges &= edges - 1) {
+      const std::size_t edge = 8 * b + static_cast<std::size_t>(std::countr_zero(edges));
+      if (first_edge == n) {
+        first_edge = edge;
+      } else {  // the run that ends here has the value that does not begin here
+        const bool begins_visible = (byte >> (edge % 8) & 1U) != 0;
+        fill_run(last_edge, edge - last_edge, begins_visible ? -1.0f : 1.0f, columns_apart_, row);
       }
-      before = byte >> 7;
+      last_edge = edge;
     }
-    const float sign = before != 0 ? 1.0f : -1.0f;  // of the run over the seam
-    if (first_edge == n) {
-      std::fill(row.begin(), row.end(), sign * kNone);
-    } else {
-      fill_run(last_edge, first_edge + n - last_edge, sign, columns_apart_, row);
-    }
+    before = byte >> 7;
+  }
+  const float sign = before != 0 ? 1.0f : -1.0f;  // of the run over the seam
+  if (first_edge == n) {
+    std::fill(row.begin(), row.end(), sign * kNone);
+  } else {
+    fill_run(last_edge, first_edge + n - last_edge, sign, columns_apart_, row);
   }
 }
 
@@ -217,7 +213,9 @@ void DistanceTransform::measure(std::span<const std::uint8_t> bits, std::uint32_
   CHECK_EQ(bits.size(), n * n / 8);
   CHECK_EQ(distances.size(), (n + row_step - 1) / row_step * n);
   std::vector<float> nearest(n * n);
-  nearest_in_rows(bits, nearest);
+  for (std::size_t r = 0; r < n; ++r) {
+    nearest_in_row(bits.subspan(r * n / 8, n / 8), std::span(nearest).subspan(r * n, n));
+  }
   const Image image{nearest.data(), rows_apart_.data(), sine_.data(), n, limit_, limit_chord_};
   float* to = distances.data();
   for (std::size_t r = 0; r < n; r += row_step, to += n) {

@@ -28,7 +28,7 @@ class DistanceTransform {
                std::span<float> distances) const;
 
  private:
-  void nearest_in_rows(std::span<const std::uint8_t> bits, std::span<float> nearest) const;
+  void nearest_in_row(std::span<const std::uint8_t> bits, std::span<float> row) const;
 
   std::uint32_t resolution_;
   float limit_;
