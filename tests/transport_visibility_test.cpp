@@ -11,6 +11,7 @@
 #include "tests/transport_images.h"
 #include "tests/transport_tiles.h"
 #include "transport/bake_point.h"
+#include "transport/embree_scene.h"
 #include "transport/signed_distance.h"
 #include "transport/sphere.h"
 #include "transport/visibility.h"
@@ -184,6 +185,26 @@ TEST(TransportVisibilityRaster, SeesWhatRaysSeeInATileSmallerThanItsFibres) {
 
 TEST(TransportVisibilityRaster, SeesWhatRaysSeeWhereSegmentsAreLong) {
   compare_raster_with_rays(test::crossed_layers(6, 5, 0.015f, 1), 2);
+}
+
+TEST(TransportVisibilityRaster, SeesWhatEmbreeSees) {
+  constexpr std::uint32_t kResolution = 128;
+  const fabric::Tile tile = test::random_hairs(300, 0.4f, 0.3f, 0.15f, 21);
+  const Scene scene(tile);
+  const EmbreeScene embree(tile);
+  const VisibilityRaster raster(scene);
+  std::uint32_t different = 0;
+  std::uint32_t visible = 0;
+  for (std::uint32_t k = 0; k < tile.segment_count(); k += 97) {
+    const auto by_rays = visibility_bits(scene, embree, k, kResolution);
+    const auto by_raster = raster.bits(k, kResolution);
+    for (std::uint32_t p = 0; p < kResolution * kResolution; ++p) {
+      different += is_visible(by_rays, p) != is_visible(by_raster, p) ? 1 : 0;
+      visible += is_visible(by_rays, p) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(visible, 1000u);
+  EXPECT_LE(different, 1u);  // a ray that grazes a fibre within rounding
 }
 
 TEST(TransportVisibilityRaster, WideAndPortablePaths_GiveTheSameBits) {
