@@ -1,7 +1,7 @@
-// Follows the same eye rays by Embree on one thread, by the kernels' text compiled as C++ on one
-// thread, and by the kernel on a device, and prints a row of a Markdown table for each fabric, flat
-// and draped: CPU time of all threads for a million rays (docs/performance.md).
-// Usage: bench_eye_rays MESH.obj FABRIC...
+// Follows the same eye rays by the CPU's scenes on one thread, by the kernels' text compiled as C++
+// on one thread, and by the kernel on a device, and prints a row of a Markdown table for each
+// fabric, flat and draped: CPU time of all threads for a million rays (docs/performance.md). Usage:
+// bench_eye_rays MESH.obj FABRIC...
 
 #include "render/gpu/eye_rays.h"
 
@@ -96,7 +96,7 @@ double differing(const std::vector<Seen>& a, const std::vector<Seen>& b) {
   return static_cast<double>(different) / static_cast<double>(a.size());
 }
 
-std::vector<Seen> by_embree(const Scene& scene, std::uint64_t seed) {
+std::vector<Seen> by_scene(const Scene& scene, std::uint64_t seed) {
   std::vector<Seen> seen;
   const std::uint64_t derived = core::derive_seed(seed, kPurposeOfEyeRays);
   for (std::uint32_t i = 0; i < kSide * kSide * kSamples; ++i) {
@@ -156,26 +156,26 @@ void print_row(gpu::Device& device, const std::string& name, const char* shape, 
   view.camera = scene.camera;
   view.width = view.height = kSide;
   const gpu::EyeBatch batch{0, 0, kSide, kSide, 0, kSamples};
-  std::vector<Seen> embree;
+  std::vector<Seen> traced;
   std::vector<Seen> text;
   std::vector<Seen> kernel;
-  const double embree_s = cpu_seconds([&] { embree = by_embree(scene, view.seed); });
+  const double scene_s = cpu_seconds([&] { traced = by_scene(scene, view.seed); });
   const double text_s = cpu_seconds([&] { text = by_text(arrays, view, batch); });
   gpu::EyeRays rays(device, geometry, view, batch.rays());
   kernel = by_device(device, rays, batch);  // compiles the kernel
   const double kernel_s = cpu_seconds([&] { kernel = by_device(device, rays, batch); });
-  std::printf("| %s, %s | %.2f | %.2f | %.2f | %.4f %% | %.4f %% |", name.c_str(), shape, embree_s,
-              text_s, kernel_s, 100 * differing(text, embree), 100 * differing(kernel, embree));
+  std::printf("| %s, %s | %.2f | %.2f | %.2f | %.4f %% | %.4f %% |", name.c_str(), shape, scene_s,
+              text_s, kernel_s, 100 * differing(text, traced), 100 * differing(kernel, traced));
   for (const std::uint32_t samples : {32U, 64U, 128U}) {
     view.nearest_samples = samples;
     gpu::EyeRays nearest(device, geometry, view, batch.rays());
-    std::printf(" %.1f %% |", 100 * differing(by_device(device, nearest, batch), embree));
+    std::printf(" %.1f %% |", 100 * differing(by_device(device, nearest, batch), traced));
   }
   const double fibres =
-      static_cast<double>(std::count_if(embree.begin(), embree.end(), [](const Seen& one) {
+      static_cast<double>(std::count_if(traced.begin(), traced.end(), [](const Seen& one) {
         return one.fate == shading::kHitFibre;
       }));
-  std::printf(" %.0f %% | %.1f | %.2f |\n", 100 * fibres / static_cast<double>(embree.size()),
+  std::printf(" %.0f %% | %.1f | %.2f |\n", 100 * fibres / static_cast<double>(traced.size()),
               static_cast<double>(arrays.size_bytes() - arrays.nearest.size() * 4) / (1 << 20),
               build * kMillions);
   std::fflush(stdout);

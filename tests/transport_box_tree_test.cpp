@@ -93,6 +93,15 @@ TEST(TransportBoxTree, BoxesThatShrinkTowardsAPoint_MakeNoDeepTree) {
   expect_sound(boxes);
 }
 
+TEST(TransportBoxTree, BoxesWhoseAreaIsNoNumber_MakeATreeAllTheSame) {
+  std::vector<Box> boxes;
+  for (int i = 0; i < 100; ++i) {
+    const float at = 1e25f * static_cast<float>(i);
+    boxes.push_back({{at, -at, at}, {2 * at, at, 1.5f * at}});
+  }
+  expect_sound(boxes);
+}
+
 TEST(TransportBoxTree, SparseNodes_HaveLanesThatHoldNothing) {
   const BoxNode node;
   for (std::size_t lane = 0; lane < kTreeWidth; ++lane) {

@@ -49,7 +49,8 @@ struct Split {
 glm::vec3 twice_middle(const Box& box) { return box.low + box.high; }
 
 float leaves_for(std::uint32_t count) {
-  return static_cast<float>((count + kTreeWidth - 1) / kTreeWidth);
+  const std::uint32_t leaves = (count + kTreeWidth - 1) / kTreeWidth;
+  return static_cast<float>(leaves);
 }
 
 // Maps an item's middle to a bin along each axis.
@@ -183,33 +184,37 @@ class Builder {
     plans_.resize(branches_.size());
     for (std::size_t b = branches_.size(); b-- > 0;) {
       const Branch& branch = branches_[b];
-      Plan& plan = plans_[b];
       const float area = branch.box.half_area();
       if (branch.children == 0) {
-        plan.steps.fill(area);
-        continue;
-      }
-      const Plan& left = plans_[branch.children];
-      const Plan& right = plans_[branch.children + 1];
-      for (std::size_t places = 2; places <= kTreeWidth; ++places) {
-        float& least = plan.steps[places - 1];
-        least = std::numeric_limits<float>::infinity();
-        for (std::size_t k = 1; k < places; ++k) {
-          const float steps = left.steps[k - 1] + right.steps[places - k - 1];
-          if (steps < least) {
-            least = steps;
-            plan.left_places[places - 1] = static_cast<std::uint8_t>(k);
-          }
-        }
-      }
-      plan.steps[0] = area + plan.steps[kTreeWidth - 1];
-      for (std::size_t i = 1; i + 1 < kTreeWidth; ++i) {
-        if (plan.steps[0] < plan.steps[i]) {
-          plan.steps[i] = plan.steps[0];
-          plan.left_places[i] = 0;
-        }
+        plans_[b].steps.fill(area);
+      } else {
+        plans_[b] = plan_of(area, plans_[branch.children], plans_[branch.children + 1]);
       }
     }
+  }
+
+  static Plan plan_of(float area, const Plan& left, const Plan& right) {
+    Plan plan;
+    for (std::size_t places = 2; places <= kTreeWidth; ++places) {
+      float least = std::numeric_limits<float>::infinity();
+      plan.left_places[places - 1] = 1;  // where areas are too large to be told apart
+      for (std::size_t k = 1; k < places; ++k) {
+        const float steps = left.steps[k - 1] + right.steps[places - k - 1];
+        if (steps < least) {
+          least = steps;
+          plan.left_places[places - 1] = static_cast<std::uint8_t>(k);
+        }
+      }
+      plan.steps[places - 1] = least;
+    }
+    plan.steps[0] = area + plan.steps[kTreeWidth - 1];
+    for (std::size_t i = 1; i + 1 < kTreeWidth; ++i) {
+      if (plan.steps[0] < plan.steps[i]) {
+        plan.steps[i] = plan.steps[0];
+        plan.left_places[i] = 0;
+      }
+    }
+    return plan;
   }
 
   // Adds the children of a node that stand for a branch in this many places.
@@ -260,10 +265,11 @@ float Box::half_area() const {
   return size.x * size.y + size.y * size.z + size.z * size.x;
 }
 
-BoxNode::BoxNode() : child{} {
-  for (std::size_t i = 0; i < bounds.size(); ++i) {
-    bounds[i].fill(i < 3 ? std::numeric_limits<float>::infinity()
-                         : -std::numeric_limits<float>::infinity());
+BoxNode::BoxNode() : bounds{}, child{} {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    bounds[axis].fill(kInfinity);
+    bounds[axis + 3].fill(-kInfinity);
   }
 }
 

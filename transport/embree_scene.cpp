@@ -104,8 +104,9 @@ struct EmbreeScene::State {
 namespace {
 
 bool holds_origin(const RayContext& context, unsigned primitive, unsigned instance) {
+  const unsigned row = instance / 3;
   const glm::vec3 step{(static_cast<float>(instance % 3) - 1) * context.block_size_mm.x,
-                       (static_cast<float>(instance / 3U) - 1) * context.block_size_mm.y, 0};
+                       (static_cast<float>(row) - 1) * context.block_size_mm.y, 0};
   const glm::vec4 end_a = context.ends[std::size_t{2} * primitive];
   const glm::vec3 a = glm::vec3(end_a) + step;
   const glm::vec3 axis = glm::vec3(context.ends[std::size_t{2} * primitive + 1]) + step - a;
@@ -227,7 +228,8 @@ void EmbreeScene::State::build_world() {
     RTCGeometry instance = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_INSTANCE);
     rtcSetGeometryInstancedScene(instance, block.get());
     const double step_x = static_cast<double>(i % 3) - 1;
-    const double step_y = static_cast<double>(i / 3) - 1;
+    const unsigned row = i / 3;
+    const double step_y = static_cast<double>(row) - 1;
     std::array<float, 12> transform{1, 0, 0, 0, 1, 0, 0, 0, 1};  // columns; the last one moves
     transform[9] = static_cast<float>(step_x * endless.block_size_mm.x);
     transform[10] = static_cast<float>(step_y * endless.block_size_mm.y);

@@ -98,8 +98,9 @@ FibreTree::FibreTree(const EndlessTile& endless_in)
     home.push_back(endless.tile_of_midpoint(k));
   }
   for (std::uint32_t i = 0; i < kBlocks; ++i) {
+    const std::uint32_t row = i / 3;
     step_mm[i] = {(static_cast<float>(i % 3) - 1) * block_size.x,
-                  (static_cast<float>(i / 3) - 1) * block_size.y, 0};
+                  (static_cast<float>(row) - 1) * block_size.y, 0};
     top.set(i, {tree.bounds.low + step_mm[i], tree.bounds.high + step_mm[i]},
             tree.root | i << kBlockShift);
   }

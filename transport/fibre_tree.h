@@ -37,7 +37,7 @@ struct FibreTree {
   static constexpr std::uint32_t kBlocks = 9;
   static constexpr std::uint32_t kBlockShift =
       27;  // a child of `top` is root | block << kBlockShift
-  static constexpr std::size_t kMaxStack = (BoxTree::kMaxDepth + 1) * kTreeWidth;
+  static constexpr std::size_t kMaxStack = std::size_t{BoxTree::kMaxDepth + 1} * kTreeWidth;
 
   explicit FibreTree(const EndlessTile& endless_in);
 

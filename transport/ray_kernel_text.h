@@ -50,7 +50,7 @@ struct Entries {
 
 // Sine squared between ray and fibre below which the ray counts as running along the fibre: it can
 // only enter by an end.
-constexpr float kParallel = 1e-7f;
+inline constexpr float kParallel = 1e-7f;
 
 // Works from the ray's point nearest to the capsule's middle, so that what rounding costs does not
 // grow with the way to there (Haines, Guenther, Akenine-Moeller 2019, Precision improvements for
