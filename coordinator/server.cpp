@@ -19,7 +19,7 @@ namespace weft::coordinator {
 
 namespace {
 
-constexpr int kThreadsLimit = 512;  // each waiting worker and watcher holds one
+constexpr int kThreadsLimit = 512;  // each call that is answered and each watcher holds one
 constexpr auto kGrace = std::chrono::seconds(2);
 constexpr auto kBetweenLooks = std::chrono::milliseconds(200);
 

@@ -20,6 +20,23 @@ bool Queue::is_chosen(const core::Digest& work, double share) {
   return static_cast<double>(number) < share * kAll || share >= 1;
 }
 
+bool StageState::awaits_audit(std::uint64_t shard) const {
+  const auto waiting = audits.find(authors[shard]);
+  return waiting != audits.end() && waiting->second.contains(shard);
+}
+
+bool StageState::withdraw_audit(std::uint64_t shard) {
+  if (!awaits_audit(shard)) {
+    return false;
+  }
+  const auto waiting = audits.find(authors[shard]);
+  waiting->second.remove(shard);
+  if (waiting->second.empty()) {
+    audits.erase(waiting);
+  }
+  return true;
+}
+
 void Queue::await_audit(StageState& stage, std::uint64_t shard, Time now) {
   if (stage.audits.empty()) {
     stage.audits_possible_at = now;
@@ -38,13 +55,8 @@ bool Queue::take_audit(StageState& stage, std::uint64_t shard, std::uint64_t att
     dispute.attempt = is_free ? attempt : dispute.attempt;
     return is_free;
   }
-  const auto waiting = stage.audits.find(stage.authors[shard]);
-  if (waiting == stage.audits.end() || !waiting->second.contains(shard)) {
+  if (!stage.withdraw_audit(shard)) {
     return false;
-  }
-  waiting->second.remove(shard);
-  if (waiting->second.empty()) {
-    stage.audits.erase(waiting);
   }
   stage.auditing.add(shard);
   return true;
@@ -78,13 +90,7 @@ void Queue::audit_not_done(const Attempt& attempt, std::uint64_t shard, Time now
     }
     return;
   }
-  const auto waiting = stage.audits.find(stage.authors[shard]);
-  if (failures >= settings_.failure_limit && waiting != stage.audits.end() &&
-      waiting->second.contains(shard)) {
-    waiting->second.remove(shard);
-    if (waiting->second.empty()) {
-      stage.audits.erase(waiting);
-    }
+  if (failures >= settings_.failure_limit && stage.withdraw_audit(shard)) {
     ++job.audits_given_up;
     refresh(job, now);
     settle(job, now, actions);
@@ -107,18 +113,10 @@ void Queue::compare(JobState& job, std::size_t index, std::uint64_t shard,
 
 void Queue::confirm(JobState& job, StageState& stage, std::uint64_t shard,
                     const std::string& worker, Time now, Actions& actions) {
-  const auto waiting = stage.audits.find(stage.authors[shard]);
-  const bool is_waiting = waiting != stage.audits.end() && waiting->second.contains(shard);
-  if (!is_waiting && !stage.auditing.contains(shard)) {
+  if (!stage.withdraw_audit(shard) && !stage.auditing.contains(shard)) {
     return;
   }
   stage.auditing.remove(shard);
-  if (is_waiting) {
-    waiting->second.remove(shard);
-    if (waiting->second.empty()) {
-      stage.audits.erase(waiting);
-    }
-  }
   ++job.audited_shards;
   ++job.revision;
   actions.audits.push_back({stage.digests[shard], worker});

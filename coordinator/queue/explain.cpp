@@ -14,8 +14,8 @@ bool is_idle(const Queue& queue, const WorkerState& worker) {
   return queue.attempts_of(worker.id).empty();
 }
 
-// What keeps the workers from a stage that has something for them.
-void explain_workers(const Queue& queue, const JobState& job, const StageState& stage, Time now,
+// What keeps the workers from a stage that has something for them; whether it keeps all of them.
+bool explain_workers(const Queue& queue, const JobState& job, const StageState& stage, Time now,
                      Reasons& reasons) {
   std::map<Obstacle, std::vector<const WorkerState*>> kept;
   std::map<Obstacle, Time> until;
@@ -31,13 +31,14 @@ void explain_workers(const Queue& queue, const JobState& job, const StageState& 
     soonest = soonest == Time{} ? hindrance.until : std::min(soonest, hindrance.until);
   }
   if (any_free) {
-    return;
+    return false;
   }
   for (const auto& [obstacle, workers] : kept) {
     if (obstacle != Obstacle::kLost) {
       reasons.add_obstacle(obstacle, workers, job, &stage, until.at(obstacle));
     }
   }
+  return true;
 }
 
 void explain_pending(const Queue& queue, const JobState& job, const StageState& stage, Time now,
@@ -58,17 +59,13 @@ void explain_pending(const Queue& queue, const JobState& job, const StageState& 
                 "weft logs " + job.id + " shows what failed", stage, soonest);
     return;
   }
-  explain_workers(queue, job, stage, now, reasons);
-  const bool any_can =
-      std::any_of(queue.workers().begin(), queue.workers().end(), [&](const auto& entry) {
-        return queue.hindrance(entry.second, job, stage, now).obstacle == Obstacle::kNone;
-      });
+  const bool all_kept = explain_workers(queue, job, stage, now, reasons);
   const bool any_idle =
       std::any_of(queue.workers().begin(), queue.workers().end(), [&](const auto& entry) {
         return queue.hindrance(entry.second, job, stage, now).obstacle == Obstacle::kNone &&
                is_idle(queue, entry.second);
       });
-  if (any_can && !any_idle) {
+  if (!all_kept && !any_idle) {
     reasons.add(reason::kWorkersBusy,
                 shards_in_words(stage.pending()) + " of " + to_string(stage.name) +
                     " wait for a free worker; all that can run them are at work",

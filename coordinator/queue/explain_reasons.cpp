@@ -69,9 +69,7 @@ void explain_done(const Queue& queue, const StageState& stage, std::uint64_t sha
     reasons.add(reason::kMismatch, "workers gave different results of it; others are asked",
                 "let a worker of another name join, if there is none", stage, {});
   }
-  const auto waiting = stage.audits.find(stage.authors[shard]);
-  if (stage.auditing.contains(shard) ||
-      (waiting != stage.audits.end() && waiting->second.contains(shard))) {
+  if (stage.auditing.contains(shard) || stage.awaits_audit(shard)) {
     reasons.add(reason::kAwaitsAudit, "it is done, and a second worker is to confirm its result",
                 "", stage, {});
   }

@@ -85,7 +85,6 @@ class Queue {
   [[nodiscard]] bool is_liar(const std::string& worker_name, StageName stage) const;
   [[nodiscard]] bool is_live(const WorkerState& worker, Time now) const;
   [[nodiscard]] const QueueSettings& settings() const { return settings_; }
-  [[nodiscard]] const FairShare& fair_share() const { return shares_; }
   [[nodiscard]] const std::map<core::Digest, Dispute>& disputes() const { return disputes_; }
   // Whose results StageState::authors names; empty: unknown.
   [[nodiscard]] const std::string& author_name(std::uint32_t author) const;

@@ -107,21 +107,18 @@ void Queue::on(const ReportEvent& event, Time now, Actions& actions) {
   }
   std::set<std::uint64_t> orders;
   std::set<std::uint64_t> named;
+  const auto note = [&](const auto& claim) {
+    named.insert(claim.attempt);
+    const auto order = order_of_job_.find(claim.job);
+    if (order != order_of_job_.end()) {
+      orders.insert(order->second);
+    }
+  };
   for (const RunningClaim& claim : event.running) {
     keep(event, claim, now, actions);
-    named.insert(claim.attempt);
-    const auto order = order_of_job_.find(claim.job);
-    if (order != order_of_job_.end()) {
-      orders.insert(order->second);
-    }
+    note(claim);
   }
-  for (const CompletionClaim& claim : event.completions) {
-    named.insert(claim.attempt);
-    const auto order = order_of_job_.find(claim.job);
-    if (order != order_of_job_.end()) {
-      orders.insert(order->second);
-    }
-  }
+  std::for_each(event.completions.begin(), event.completions.end(), note);
   std::erase_if(workers_.at(event.worker).settled,
                 [&](std::uint64_t id) { return !named.contains(id); });
   if (event.leaving) {

@@ -116,7 +116,6 @@ void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& pl
 void Queue::add_known(std::uint64_t order, JobState& job, std::size_t index,
                       const PlannedStage& planned, Time now) {
   StageState& stage = job.stages[index];
-  std::vector<bool> is_audited(planned.known.empty() ? 0 : stage.shards.size());
   for (const KnownResult& known : planned.known) {
     CHECK_LT(known.shard, stage.shards.size());
     if (stage.shards[known.shard] != ShardState::kPending) {

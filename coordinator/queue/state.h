@@ -91,6 +91,9 @@ struct StageState {
   }
   // Done shards that are not to be relied on yet.
   [[nodiscard]] std::uint64_t unconfirmed() const;
+  [[nodiscard]] bool awaits_audit(std::uint64_t shard) const;
+  // Nobody is to be asked about the shard any more; says whether somebody was.
+  bool withdraw_audit(std::uint64_t shard);
 };
 
 enum class JobPhase : std::uint8_t {

@@ -136,7 +136,6 @@ Journal::Ticket Scheduler::put_back(const std::string& id, std::vector<Record> r
   file.comment = record->comment;
   file.user = record->demands.user;
   file.first_revision = ended.revision() + 1;
-  ++unfinished_of_user_[file.user];
   ended_.erase(id);
   std::erase(ended_order_, id);
   spdlog::info("job={} event=put_back", id);

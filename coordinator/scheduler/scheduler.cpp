@@ -118,7 +118,6 @@ void Scheduler::load(const JobRecord& record) {
   JobFile& file = files_[record.id];
   file.comment = record.comment;
   file.user = record.demands.user;
-  ++unfinished_of_user_[file.user];
   const bool is_readable = file.description.ParseFromString(record.description);
   const Time submitted_at(std::chrono::milliseconds(record.submitted_at_ms));
   apply(SubmitEvent{record.id, record.fabric, record.fingerprint, submitted_at, record.demands,
@@ -214,10 +213,6 @@ void Scheduler::end_job(const std::string& id, std::vector<Record>& records) {
     ended_.erase(ended_order_.front());
     ended_order_.pop_front();
   }
-  const auto user = unfinished_of_user_.find(files_.at(id).user);
-  if (--user->second == 0) {
-    unfinished_of_user_.erase(user);
-  }
   files_.erase(id);
   queue_.forget_job(id);
 }
@@ -296,9 +291,9 @@ void Scheduler::check_limits(const std::string& user) const {
                                         " unfinished jobs, which is the limit; wait for some, or "
                                         "cancel them");
   }
-  const auto jobs = unfinished_of_user_.find(user);
-  if (jobs != unfinished_of_user_.end() && jobs->second >= options_.queue.user_jobs_limit) {
-    refuse("user_jobs_limit", user + " has " + std::to_string(jobs->second) +
+  const std::size_t jobs = queue_.unfinished_jobs_of(user);
+  if (jobs >= options_.queue.user_jobs_limit) {
+    refuse("user_jobs_limit", user + " has " + std::to_string(jobs) +
                                   " unfinished jobs, which is the limit of one user; wait for "
                                   "some, or cancel them");
   }
@@ -342,8 +337,7 @@ v1::Job Scheduler::submit(const v1::SubmitRequest& request, const security::Call
   file.description = request.description();
   file.comment = record.comment;
   file.user = record.demands.user;
-  ++unfinished_of_user_[file.user];
-  const SubmitEvent event{record.id, record.fabric, std::nullopt, now, record.demands, false};
+  const SubmitEvent event{record.id, record.fabric, std::nullopt, now, record.demands, false, {}};
   spdlog::info("job={} fabric={} user={} event=submitted", record.id, record.fabric, file.user);
   const std::string id = record.id;
   std::vector<Record> records;

@@ -38,7 +38,7 @@ using CommitFunction = std::function<core::Digest(
     const std::filesystem::path& path)>;
 
 struct SchedulerOptions {
-  std::filesystem::path state_folder;  // journal.db, blobs/, versions/, committing/
+  std::filesystem::path state_folder;  // docs/architecture.md says what is in it
   QueueSettings queue;
   CommitFunction commit;
   // Nothing is submitted any more when the journal has grown to so much.
@@ -216,7 +216,6 @@ class Scheduler {
   std::mutex mutex_;  // of everything below
   Queue queue_;
   std::map<std::string, JobFile> files_;  // of unfinished jobs
-  std::map<std::string, std::uint64_t> unfinished_of_user_;
   std::map<std::string, v1::Job> ended_;
   std::deque<std::string> ended_order_;  // oldest first
   OrderLog orders_;
