@@ -70,7 +70,8 @@ void complete(const Queue& queue, ReportEvent& report, std::uint64_t* shards) {
 int run() {
   Time now{std::chrono::hours(1)};
   Queue queue({}, 1);
-  static_cast<void>(queue.apply(SubmitEvent{"job", "fabric", core::Digest{}, now, {}, false}, now));
+  static_cast<void>(
+      queue.apply(SubmitEvent{"job", "fabric", core::Digest{}, now, {}, false, {}}, now));
   std::size_t before = 0;
   {
     const PlannedEvent event = planned();

@@ -256,10 +256,13 @@ TEST_F(JournalTest, EndedJob_HasNoFailuresAndNoRunningAttempts_AndCanBeRetried) 
   Journal journal(file());
   journal.append({job("a"), FailureRecord{"a", StageName::kGrid, 1, "w", "x", {}},
                   AttemptRecord{"a", 1, StageName::kGrid, 0, 1, "i", "w", Purpose::kFirst, 5},
+                  MismatchRecord{"a", StageName::kGrid, 1, "w", {}, "w2", {}, ""},
                   JobEndRecord{"a", 99, "summary"}});
   EXPECT_TRUE(journal.failures_of("a", StageName::kGrid).empty());
   EXPECT_TRUE(journal.running_attempts("a", StageName::kGrid).empty());
+  EXPECT_EQ(journal.mismatches_of("a").size(), 1U);
   journal.append({RetryRecord{"a"}});
+  EXPECT_TRUE(journal.mismatches_of("a").empty());
   const JobRecord again = *journal.job("a");
   EXPECT_EQ(again.ended_at_ms, 0);
   EXPECT_EQ(again.summary, "");

@@ -171,6 +171,57 @@ TEST_F(Orders, FailedJob_IsRetriedWithItsFailuresForgotten) {
   EXPECT_EQ(now.state(), v1::JOB_STATE_SUCCEEDED) << now.error();
 }
 
+TEST_F(Orders, ResultsThatDiffer_AreToldAcrossARestart) {
+  v1::SubmitRequest audited = request("r1");
+  audited.mutable_options()->set_audit(1);
+  const std::string id = scheduler_->submit(audited, anna()).id();
+  FakeWorker first(channel_, "first");
+  ASSERT_TRUE(first.work());
+  ASSERT_EQ(first.log.at(0), "geometry 0+1");
+  first.request().set_free_attempts(0);
+  first.request().set_wait_ms(0);
+  first.work();
+  FakeWorker second(channel_, "second");
+  ASSERT_TRUE(second.work());
+  ASSERT_EQ(second.log.at(0), "geometry 0+1") << "the audit";
+  const core::Digest lie = core::digest_of("a lie");
+  v1::WriteResponse written;
+  ASSERT_TRUE(write("a lie", lie, &written).ok());
+  second.request().mutable_completions(0)->mutable_results(0)->set_digest(lie.binary());
+  second.request().set_free_attempts(0);
+  second.request().set_wait_ms(0);
+  second.work();
+  const v1::Job before = job(id);
+  ASSERT_EQ(before.troubles_size(), 1);
+  EXPECT_EQ(before.troubles(0).kind(), v1::Trouble::KIND_MISMATCH);
+
+  restart();
+  const v1::Job after = job(id);
+  ASSERT_EQ(after.troubles_size(), 1);
+  EXPECT_EQ(after.troubles(0).SerializeAsString(), before.troubles(0).SerializeAsString());
+  v1::ExplainRequest why;
+  why.set_job_id(id);
+  FakeWorker third(channel_, "third");
+  third.request().set_free_attempts(0);
+  third.request().set_wait_ms(0);
+  third.work();
+  std::set<std::string> codes;
+  const v1::ExplainResponse said = scheduler_->explain(why);
+  for (const v1::Reason& reason : said.reasons()) {
+    codes.insert(reason.code());
+  }
+  EXPECT_TRUE(codes.contains("mismatch"));
+  // Further workers are asked as before, and the liar is found.
+  third.request().set_free_attempts(1);
+  third.request().set_wait_ms(5'000);
+  for (int turn = 0; turn < 20 && job(id).troubles(0).liar().empty(); ++turn) {
+    third.work();
+  }
+  EXPECT_EQ(job(id).troubles(0).liar(), "second");
+  restart();
+  EXPECT_EQ(job(id).troubles(0).liar(), "second");
+}
+
 TEST_F(Orders, Limits_AnswerWithTheirNames) {
   for (const char* id : {"r1", "r2", "r3"}) {
     (void)scheduler_->submit(request(id), anna());

@@ -198,5 +198,97 @@ TEST_F(QueueAudits, Audits_SurviveARestart) {
   EXPECT_EQ(cluster_.audited.size(), 4U);
 }
 
+TEST_F(QueueAudits, AMismatchWithoutAVerdict_IsToldAndLookedIntoAfterARestart) {
+  cluster_.submit("a", {1, 4});
+  first_.sync(1);
+  cluster_.apply(DisconnectEvent{"first"});
+  second_.sync(1);
+  second_.finish();
+  second_.sync();
+  first_.finish(1'000, ~std::uint64_t{0}, "a lie");  // comes late: nobody had asked for an audit
+  first_.sync();
+  const std::vector<Trouble> before = job().troubles;
+  ASSERT_EQ(before.size(), 1U);
+  cluster_.restart();
+  ASSERT_EQ(job().troubles.size(), 1U);
+  EXPECT_EQ(job().troubles[0].message, before[0].message);
+  EXPECT_EQ(job().troubles[0].workers, before[0].workers);
+  EXPECT_EQ(job().stages[0].disputed.size(), 1U);
+  check_queue(cluster_.queue, cluster_.now);
+  first_.sync(1);  // whoever gave one of the two results is not asked
+  second_.sync(1);
+  for (const QueueWorker* const worker : {&first_, &second_}) {
+    for (const AssignAction& assign : worker->held) {
+      EXPECT_NE(assign.purpose, Purpose::kAudit);
+    }
+  }
+  work(third_);
+  EXPECT_TRUE(cluster_.queue.is_liar("first", all_stages()[0]));
+  EXPECT_FALSE(cluster_.queue.is_liar("second", all_stages()[0]));
+  EXPECT_EQ(job().troubles[0].liar, "first");
+}
+
+TEST_F(QueueAudits, ALiarThatWasFound_IsToldAfterARestart) {
+  cluster_.submit("a", {1, 4});
+  first_.sync(1);
+  cluster_.apply(DisconnectEvent{"first"});
+  second_.sync(1);
+  second_.finish();
+  second_.sync();
+  first_.finish(1'000, ~std::uint64_t{0}, "a lie");
+  first_.sync();
+  third_.sync(1);
+  for (int turn = 0; turn < 5 && job().troubles[0].liar.empty(); ++turn) {
+    third_.finish();
+    third_.sync(1);
+  }
+  ASSERT_FALSE(job().has_ended());
+  const std::vector<Trouble> before = job().troubles;
+  ASSERT_EQ(before[0].liar, "first");
+  cluster_.restart();
+  ASSERT_EQ(job().troubles.size(), 1U);
+  EXPECT_EQ(job().troubles[0].message, before[0].message);
+  EXPECT_EQ(job().troubles[0].liar, "first");
+  EXPECT_TRUE(job().stages[0].disputed.empty());
+  EXPECT_TRUE(job().open_mismatches.empty());
+}
+
+// Found by a seed of tests/simulation.
+TEST(QueueRestart, AnAuditOfTwoDisputedShards_LeavesTheSecondToOthersWhenTheJobBeginsAgain) {
+  QueueCluster cluster;
+  QueueWorker late(cluster, "late", 2);
+  cluster.submit_audited("a", {2, 1}, 1);
+  late.sync(1);
+  ASSERT_EQ(late.held.at(0).shards, 2U);
+  cluster.apply(DisconnectEvent{"late"});
+  QueueWorker liar(cluster, "liar", 2);
+  for (int turn = 0; turn < 2; ++turn) {
+    liar.sync(1);
+    liar.finish(1'000, ~std::uint64_t{0}, "a lie");
+    liar.sync();
+  }
+  QueueWorker other(cluster, "other", 2);
+  other.sync(1);
+  ASSERT_EQ(other.held.at(0).purpose, Purpose::kAudit);
+  ASSERT_EQ(other.held[0].shards, 2U);
+  late.finish();
+  late.sync();  // otherwise than the liar, of both
+  ASSERT_EQ(cluster.queue.disputes().size(), 2U);
+  cluster.restart();
+  ASSERT_EQ(cluster.queue.disputes().size(), 2U);
+  for (int turn = 0; turn < 30 && !cluster.job("a").has_ended(); ++turn) {
+    for (QueueWorker* const worker : {&other, &late}) {
+      while (!worker->held.empty()) {
+        worker->finish();
+      }
+      worker->sync(1);
+    }
+    cluster.advance(1'000);
+    check_queue(cluster.queue, cluster.now);
+  }
+  EXPECT_EQ(cluster.job("a").phase, JobPhase::kSucceeded) << cluster.job("a").error;
+  EXPECT_TRUE(cluster.queue.is_liar("liar", all_stages()[0]));
+}
+
 }  // namespace
 }  // namespace weft::coordinator

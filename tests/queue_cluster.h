@@ -27,7 +27,7 @@ class QueueCluster {
               const std::string& content = "", std::optional<core::Digest> fingerprint = {},
               const JobDemands& demands = {}) {
     plans_[job] = {std::move(shards), content.empty() ? job : content};
-    submitted_.push_back({job, "fabric", fingerprint, now, demands, false});
+    submitted_.push_back({job, "fabric", fingerprint, now, demands, false, {}});
     apply(submitted_.back());
   }
   void submit_for(const std::string& user, const std::string& job,
@@ -50,13 +50,28 @@ class QueueCluster {
     for (const auto& [worker, is_liar] : blocked) {
       apply(BlockEvent{worker.first, worker.second, true, is_liar});
     }
-    const std::vector<SubmitEvent> jobs = submitted_;
-    for (const SubmitEvent& job : jobs) {
+    std::vector<SubmitEvent> jobs = submitted_;
+    for (SubmitEvent& job : jobs) {
       if (std::find(ended.begin(), ended.end(), job.job) == ended.end()) {
+        job.mismatches = mismatches_of(job.job);
         apply(job);
       }
     }
     prior_attempts.clear();
+  }
+
+  // As the journal has them: one without a liar is replaced by the next of its shard.
+  [[nodiscard]] std::vector<MismatchRecord> mismatches_of(const std::string& job) const {
+    std::vector<MismatchRecord> kept;
+    for (const MismatchRecord& found : mismatches) {
+      if (found.job == job) {
+        std::erase_if(kept, [&](const MismatchRecord& open) {
+          return open.stage == found.stage && open.shard == found.shard && open.liar.empty();
+        });
+        kept.push_back(found);
+      }
+    }
+    return kept;
   }
 
   // What a shard's work is called and what its result is.

@@ -39,7 +39,7 @@ struct JobEndRecord {
   std::int64_t ended_at_ms = 0;
   std::string summary;
 };
-// The job has not ended after all; its failures are forgotten.
+// The job has not ended after all; its failures and mismatches are forgotten.
 struct RetryRecord {
   std::string job;
 };

@@ -86,6 +86,7 @@ void RecordWriter::put(const RetryRecord& retry) {
       .text(retry.job)
       .step();
   forget_failures(retry.job);
+  forget_mismatches(retry.job);
 }
 
 void RecordWriter::put(const PauseRecord& pause) {
@@ -243,6 +244,10 @@ void RecordWriter::forget_failures(const std::string& job) {
   Statement(connection_, "DELETE FROM failures WHERE job = ?").text(job).step();
 }
 
+void RecordWriter::forget_mismatches(const std::string& job) {
+  Statement(connection_, "DELETE FROM mismatches WHERE job = ?").text(job).step();
+}
+
 void RecordWriter::prune_attempts(const std::string& job) {
   std::uint64_t& count = ended_attempts_[job];
   if (count <= kEndedAttemptsLimit) {
@@ -272,7 +277,7 @@ void RecordWriter::prune_jobs() {
   }
   for (const std::string& job : jobs) {
     Statement(connection_, "DELETE FROM attempts WHERE job = ?").text(job).step();
-    Statement(connection_, "DELETE FROM mismatches WHERE job = ?").text(job).step();
+    forget_mismatches(job);
     ended_attempts_.erase(job);
   }
   Statement(connection_,

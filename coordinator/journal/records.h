@@ -38,6 +38,7 @@ class RecordWriter {
   void put(const AttemptEndRecord& end);
   void put(const MismatchRecord& mismatch);
   void forget_failures(const std::string& job);
+  void forget_mismatches(const std::string& job);
   void prune_attempts(const std::string& job);
   void prune_jobs();
 

@@ -55,6 +55,9 @@ Attempt Queue::end_attempt(std::uint64_t id, Outcome outcome, const std::string&
     ended_for_good_.insert(id);
   }
   slow_.erase(id);
+  for (auto& [work, dispute] : disputes_) {
+    dispute.attempt = dispute.attempt == id ? 0 : dispute.attempt;
+  }
   find_job(attempt.job)->stages[attempt.stage].attempts.erase(id);
   const auto held = attempts_of_worker_.find(attempt.worker);
   held->second.erase(id);

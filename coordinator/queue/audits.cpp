@@ -70,9 +70,6 @@ void Queue::put_back_audits(const Attempt& attempt, Time now) {
     if (stage.auditing.contains(shard)) {
       stage.auditing.remove(shard);
       await_audit(stage, shard, now);
-    } else if (stage.disputed.contains(shard)) {
-      Dispute& dispute = disputes_.at(stage.digests[shard]);
-      dispute.attempt = dispute.attempt == attempt.id ? 0 : dispute.attempt;
     }
   }
 }

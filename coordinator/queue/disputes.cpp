@@ -17,12 +17,22 @@ std::string in_words(StageName stage, std::uint64_t shard) {
   return std::string(to_string(stage)) + " shard " + std::to_string(shard);
 }
 
-std::vector<std::string> names_of(const Dispute& dispute) {
+std::string shown(const std::string& worker) { return worker.empty() ? "(unknown)" : worker; }
+
+std::vector<std::string> sorted_names(const std::vector<std::string>& workers) {
   std::set<std::string> names;
-  for (const Dispute::Opinion& opinion : dispute.opinions) {
-    names.insert(opinion.worker.empty() ? "(unknown)" : opinion.worker);
+  for (const std::string& worker : workers) {
+    names.insert(shown(worker));
   }
   return {names.begin(), names.end()};
+}
+
+std::vector<std::string> names_of(const Dispute& dispute) {
+  std::vector<std::string> workers;
+  for (const Dispute::Opinion& opinion : dispute.opinions) {
+    workers.push_back(opinion.worker);
+  }
+  return sorted_names(workers);
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -31,6 +41,32 @@ std::string listed(const std::vector<std::string>& names) {
     text += (text.empty() ? "" : ", ") + name;
   }
   return text;
+}
+
+// One mismatch is told of each shard: the last.
+void tell(JobState& job, Trouble mismatch) {
+  const auto told =
+      std::find_if(job.troubles.begin(), job.troubles.end(), [&](const Trouble& trouble) {
+        return trouble.kind == Trouble::Kind::kMismatch && trouble.stage == mismatch.stage &&
+               trouble.shard == mismatch.shard;
+      });
+  if (told == job.troubles.end()) {
+    job.troubles.push_back(std::move(mismatch));
+  } else {
+    *told = std::move(mismatch);
+  }
+}
+
+Trouble differing(StageName stage, std::uint64_t shard, std::vector<std::string> workers) {
+  const std::string message = in_words(stage, shard) + ": " + listed(workers) +
+                              " gave different results; which is right is not yet known";
+  return {Trouble::Kind::kMismatch, stage, shard, message, std::move(workers), 0, ""};
+}
+
+void name_liar(Trouble& trouble, const std::string& liar) {
+  trouble.liar = liar;
+  trouble.message = in_words(trouble.stage, trouble.shard) + ": " + liar +
+                    " gave a wrong result; others agree on another one";
 }
 
 }  // namespace
@@ -42,60 +78,95 @@ bool Dispute::has_asked(const std::string& worker) const {
 
 void Queue::dispute(JobState& job, std::size_t index, std::uint64_t shard,
                     const Dispute::Opinion& opinion, Time now, Actions& actions) {
-  const StageState& first = job.stages[index];
-  const core::Digest work = first.digests[shard];
-  const core::Digest recorded = first.results[shard];
-  const std::string& author = author_name(first.authors[shard]);
-  actions.mismatches.push_back(
-      {job.id, first.name, shard, author, recorded, opinion.worker, opinion.result, ""});
+  const StageState& stage = job.stages[index];
+  const core::Digest work = stage.digests[shard];
+  const core::Digest recorded = stage.results[shard];
+  const std::string& author = author_name(stage.authors[shard]);
   Dispute dispute;
-  dispute.stage = first.name;
+  dispute.stage = stage.name;
   dispute.opinions = {{author, recorded, 0}, opinion};
+  if (!open_dispute(work, std::move(dispute), now, actions)) {
+    // Its job is being committed: too late for a third opinion there, but others shall not use it.
+    actions.mismatches.push_back(
+        {job.id, stage.name, shard, author, recorded, opinion.worker, opinion.result, ""});
+    actions.results_dropped.push_back({work, recorded});
+  }
+}
+
+// All jobs that use the work wait for what others say of it; whether there are any.
+bool Queue::open_dispute(const core::Digest& work, Dispute dispute, Time now, Actions& actions) {
   dispute.possible_at = now;
-  for (auto& [order, other] : jobs_) {
-    if (other.has_ended() || other.phase == JobPhase::kCommitting) {
+  for (auto& [order, job] : jobs_) {
+    if (job.has_ended() || job.phase == JobPhase::kCommitting) {
       continue;
     }
-    for (StageState& stage : other.stages) {
-      for (std::uint64_t i = 0; stage.name == first.name && i < stage.shards.size(); ++i) {
+    for (StageState& stage : job.stages) {
+      for (std::uint64_t i = 0; stage.name == dispute.stage && i < stage.shards.size(); ++i) {
         if (stage.digests[i] == work && stage.shards[i] == ShardState::kDone) {
           dispute.jobs.insert(order);
-          join_dispute(other, stage, i, dispute);
+          join_dispute(job, stage, i, dispute, actions);
         }
       }
     }
-    refresh(other, now);
+    refresh(job, now);
   }
   if (dispute.jobs.empty()) {
-    // Its job is being committed: too late for a third opinion there, but others shall not use it.
-    actions.results_dropped.push_back({work, recorded});
-    return;
+    return false;
   }
   disputes_[work] = std::move(dispute);
   actions.wake = true;
+  return true;
 }
 
 void Queue::join_dispute(JobState& job, StageState& stage, std::uint64_t shard,
-                         const Dispute& dispute) {
-  const auto waiting = stage.audits.find(stage.authors[shard]);
-  if (waiting != stage.audits.end()) {
-    waiting->second.remove(shard);
-    if (waiting->second.empty()) {
-      stage.audits.erase(waiting);
-    }
-  }
+                         const Dispute& dispute, Actions& actions) {
+  const Dispute::Opinion& recorded = dispute.opinions[0];
+  const Dispute::Opinion& other = dispute.opinions[1];
+  actions.mismatches.push_back({job.id, stage.name, shard, recorded.worker, recorded.result,
+                                other.worker, other.result, ""});
+  stage.withdraw_audit(shard);
   stage.auditing.remove(shard);
   stage.disputed.insert(shard);
   ++job.revision;
-  const bool is_known = std::any_of(job.troubles.begin(), job.troubles.end(), [&](const auto& t) {
-    return t.kind == Trouble::Kind::kMismatch && t.stage == stage.name && t.shard == shard;
-  });
-  if (!is_known) {
-    job.troubles.push_back({Trouble::Kind::kMismatch, stage.name, shard,
-                            in_words(stage.name, shard) + ": " + listed(names_of(dispute)) +
-                                " gave different results; others are asked",
-                            names_of(dispute), 0, ""});
+  tell(job, differing(stage.name, shard, names_of(dispute)));
+}
+
+// What was found before a restart is told as before.
+void Queue::restore_mismatches(JobState& job, const std::vector<MismatchRecord>& mismatches) {
+  for (const MismatchRecord& found : mismatches) {
+    if (found.liar.empty()) {
+      job.open_mismatches.push_back(found);
+    }
+    Trouble trouble =
+        differing(found.stage, found.shard, sorted_names({found.worker, found.other_worker}));
+    if (!found.liar.empty()) {
+      name_liar(trouble, found.liar);
+    }
+    tell(job, std::move(trouble));
   }
+}
+
+// A shard about which a restart left no verdict: further workers are asked again. Whether it is
+// one, and its result one of the two that differ.
+bool Queue::dispute_again(JobState& job, std::size_t index, std::uint64_t shard, Time now,
+                          Actions& actions) {
+  const StageState& stage = job.stages[index];
+  const core::Digest& recorded = stage.results[shard];
+  const auto open = std::find_if(
+      job.open_mismatches.begin(), job.open_mismatches.end(), [&](const MismatchRecord& found) {
+        return found.stage == stage.name && found.shard == shard &&
+               (found.result == recorded || found.other_result == recorded);
+      });
+  if (open == job.open_mismatches.end()) {
+    return false;
+  }
+  Dispute dispute;
+  dispute.stage = stage.name;
+  dispute.opinions = {{open->worker, open->result, 0}, {open->other_worker, open->other_result, 0}};
+  if (open->result != recorded) {
+    std::swap(dispute.opinions[0], dispute.opinions[1]);
+  }
+  return open_dispute(core::Digest(stage.digests[shard]), std::move(dispute), now, actions);
 }
 
 // One more result of a disputed shard. Each name counts once.
@@ -153,19 +224,18 @@ void Queue::resolve(const core::Digest& work, const core::Digest& right, Time no
     liars.erase(opinion.worker);  // it once gave the right one: two machines of one name
   }
   liars.erase("");
+  const std::string named =
+      liars.empty() ? shown(wrong[0].worker) : listed({liars.begin(), liars.end()});
   for (const std::uint64_t order : dispute.jobs) {
     for (Trouble& trouble : jobs_.at(order).troubles) {
-      const bool is_it = trouble.kind == Trouble::Kind::kMismatch && trouble.liar.empty() &&
+      const bool is_it = trouble.kind == Trouble::Kind::kMismatch &&
                          trouble.stage == dispute.stage && is_disputed(order, trouble, work);
       if (is_it) {
-        trouble.liar = listed({liars.begin(), liars.end()});
         trouble.workers = names_of(dispute);
-        trouble.message = in_words(trouble.stage, trouble.shard) + ": " +
-                          (liars.empty() ? "a worker" : trouble.liar) + " gave a wrong result, " +
-                          std::to_string(honest.size()) + " others agree on another one";
+        name_liar(trouble, named);
         actions.mismatches.push_back({jobs_.at(order).id, dispute.stage, trouble.shard,
                                       honest[0].worker, right, wrong[0].worker, wrong[0].result,
-                                      wrong[0].worker});
+                                      named});
       }
     }
   }

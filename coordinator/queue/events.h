@@ -69,6 +69,19 @@ struct JobDemands {
   std::vector<std::string> labels;  // that a worker must have, all of them
 };
 
+// Two results of one deterministic shard differ: both workers are named, and the liar when it is
+// known. A record, and told again after a restart.
+struct MismatchRecord {
+  std::string job;
+  StageName stage = StageName::kGeometry;
+  std::uint64_t shard = 0;
+  std::string worker;
+  core::Digest result;
+  std::string other_worker;
+  core::Digest other_result;
+  std::string liar;  // empty: not yet known
+};
+
 // ---- events
 
 struct SubmitEvent {
@@ -78,6 +91,7 @@ struct SubmitEvent {
   Time submitted_at{};
   JobDemands demands;
   bool is_paused = false;
+  std::vector<MismatchRecord> mismatches;  // found before a restart, in the order of their records
 };
 
 struct PauseEvent {
@@ -226,6 +240,7 @@ struct ReportEvent {
   std::vector<std::string> labels;
   std::uint64_t wall_left_ms = 0;    // 0: no limit
   std::vector<core::Digest> scenes;  // tiles whose scenes it holds
+  std::string undelivered;           // what keeps its results from us; empty: nothing
 };
 
 // Time has passed.
@@ -308,8 +323,8 @@ struct BlockRecord {
   bool is_blocked = true;
   bool is_liar = false;  // it gave wrong results: none of its results of this kind are taken
 };
-// The same attempt may begin a second time: after a restart its worker came back with it when its
-// lease was over and nobody else ran its shards.
+// The same attempt may begin a second time: its worker came back with it when its lease was over
+// and nobody else ran its shards. What was recorded of its first beginning and its end is kept.
 struct AttemptRecord {
   std::string job;
   std::uint64_t attempt = 0;
@@ -330,18 +345,6 @@ struct AttemptEndRecord {
   std::uint64_t shards_done = 0;
   std::string message;
   std::int64_t ended_at_ms = 0;
-};
-// Two results of one deterministic shard differ: both workers are named, and the liar when it is
-// known.
-struct MismatchRecord {
-  std::string job;
-  StageName stage = StageName::kGeometry;
-  std::uint64_t shard = 0;
-  std::string worker;
-  core::Digest result;
-  std::string other_worker;
-  core::Digest other_result;
-  std::string liar;  // empty: not yet known
 };
 struct BindRecord {
   std::string job;

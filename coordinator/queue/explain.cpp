@@ -167,9 +167,21 @@ void explain_waiting(const Queue& queue, const JobState& job, Time now, Reasons&
   }
 }
 
+// Whether explain_audits says of this mismatch whom it waits for.
+bool is_asked(const JobState& job, const Trouble& mismatch) {
+  return std::any_of(job.stages.begin(), job.stages.end(), [&](const StageState& stage) {
+    return stage.name == mismatch.stage && stage.disputed.contains(mismatch.shard);
+  });
+}
+
 void explain_troubles(const JobState& job, Reasons& reasons) {
   for (const Trouble& trouble : job.troubles) {
     if (trouble.kind == Trouble::Kind::kMismatch) {
+      if (!is_asked(job, trouble)) {
+        reasons.add(
+            reason::kMismatch, trouble.message,
+            trouble.liar.empty() ? "" : "mend the machine, then weft unblock " + trouble.liar);
+      }
       continue;
     }
     reasons.add(reason::kQuarantined, trouble.message,

@@ -83,6 +83,7 @@ void Queue::on(const SubmitEvent& event, Time now, Actions& actions) {
   job.is_paused = event.is_paused;
   job.served_at = now;
   job.waiting_since = now;
+  restore_mismatches(job, event.mismatches);
   if (event.fingerprint) {
     job.fingerprint = event.fingerprint;
     ask_for_plan(job, actions);

@@ -162,7 +162,7 @@ class Queue {
   void add_stage(std::uint64_t order, JobState& job, const PlannedStage& planned, Time now,
                  Actions& actions);
   void add_known(std::uint64_t order, JobState& job, std::size_t index, const PlannedStage& planned,
-                 Time now);
+                 Time now, Actions& actions);
   void add_failures(JobState& job, std::size_t index, const PlannedStage& planned, Time now);
   void restore(JobState& job, std::size_t index, const PriorAttempt& prior, Time now,
                Actions& actions);
@@ -231,7 +231,12 @@ class Queue {
   // disputes (disputes.cpp)
   void dispute(JobState& job, std::size_t stage, std::uint64_t shard,
                const Dispute::Opinion& opinion, Time now, Actions& actions);
-  void join_dispute(JobState& job, StageState& stage, std::uint64_t shard, const Dispute& dispute);
+  bool open_dispute(const core::Digest& work, Dispute dispute, Time now, Actions& actions);
+  static void join_dispute(JobState& job, StageState& stage, std::uint64_t shard,
+                           const Dispute& dispute, Actions& actions);
+  static void restore_mismatches(JobState& job, const std::vector<MismatchRecord>& mismatches);
+  bool dispute_again(JobState& job, std::size_t stage, std::uint64_t shard, Time now,
+                     Actions& actions);
   void hear(const core::Digest& work, const Dispute::Opinion& opinion, Time now, Actions& actions);
   void resolve(const core::Digest& work, const core::Digest& right, Time now, Actions& actions);
   void replace(const core::Digest& work, const Dispute& dispute, const Dispute::Opinion& right,

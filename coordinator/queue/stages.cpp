@@ -63,7 +63,7 @@ void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& pl
   stage.results.assign(count, core::Digest{});
   stage.authors.assign(count, 0);
   stage.started_at = now;
-  add_known(order, job, index, planned, now);
+  add_known(order, job, index, planned, now, actions);
   add_failures(job, index, planned, now);
   std::uint64_t first = 0;  // of the shards in a row that are pending and were in no trouble
   for (std::uint64_t i = 0; i < count; ++i) {
@@ -114,7 +114,7 @@ void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& pl
 }
 
 void Queue::add_known(std::uint64_t order, JobState& job, std::size_t index,
-                      const PlannedStage& planned, Time now) {
+                      const PlannedStage& planned, Time now, Actions& actions) {
   StageState& stage = job.stages[index];
   for (const KnownResult& known : planned.known) {
     CHECK_LT(known.shard, stage.shards.size());
@@ -130,12 +130,14 @@ void Queue::add_known(std::uint64_t order, JobState& job, std::size_t index,
     const auto disputed = disputes_.find(work);
     if (disputed != disputes_.end()) {
       disputed->second.jobs.insert(order);
-      join_dispute(job, stage, known.shard, disputed->second);
-    } else if (!known.is_audited &&
+      join_dispute(job, stage, known.shard, disputed->second, actions);
+    } else if (!dispute_again(job, index, known.shard, now, actions) && !known.is_audited &&
                (is_chosen(work, job.demands.audit) || is_liar(known.worker, stage.name))) {
       await_audit(stage, known.shard, now);
     }
   }
+  std::erase_if(job.open_mismatches,
+                [&](const MismatchRecord& open) { return open.stage == stage.name; });
 }
 
 void Queue::add_failures(JobState& job, std::size_t index, const PlannedStage& planned, Time now) {

@@ -127,6 +127,8 @@ struct JobState {
   Time ended_at{};
   std::uint64_t revision = 0;
   std::vector<Trouble> troubles;  // the oldest first
+  // Of before a restart, without a verdict: others are asked again when their stage is planned.
+  std::vector<MismatchRecord> open_mismatches;
   // Since the coordinator's start: reports of attempts that owned nothing any more, and the results
   // taken from them; attempts of the two other purposes; audits that nobody could do.
   std::uint64_t superseded_attempts = 0;

@@ -141,8 +141,13 @@ Journal::Ticket Scheduler::put_back(const std::string& id, std::vector<Record> r
   spdlog::info("job={} event=put_back", id);
   records.emplace_back(RetryRecord{id});
   const Time submitted_at(std::chrono::milliseconds(record->submitted_at_ms));
-  return apply(SubmitEvent{id, record->fabric, record->fingerprint, submitted_at,
-                           std::move(record->demands), false},
+  return apply(SubmitEvent{id,
+                           record->fabric,
+                           record->fingerprint,
+                           submitted_at,
+                           std::move(record->demands),
+                           false,
+                           {}},
                nullptr, std::move(records));
 }
 

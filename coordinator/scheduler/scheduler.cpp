@@ -121,7 +121,7 @@ void Scheduler::load(const JobRecord& record) {
   const bool is_readable = file.description.ParseFromString(record.description);
   const Time submitted_at(std::chrono::milliseconds(record.submitted_at_ms));
   apply(SubmitEvent{record.id, record.fabric, record.fingerprint, submitted_at, record.demands,
-                    record.is_paused},
+                    record.is_paused, journal_.mismatches_of(record.id)},
         nullptr);
   if (!is_readable) {
     apply(JobFailedEvent{record.id, 0,

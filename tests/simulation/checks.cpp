@@ -77,6 +77,20 @@ void Checks::unavailable(const core::Digest& work) {
 void Checks::loaded(const Queue& queue, const Tables& tables) {
   epoch_ = tables.epoch;
   check_promises(tables, &queue);
+  for (const JobState* const job : queue.jobs()) {
+    std::map<std::pair<StageName, std::uint64_t>, std::string> liars;
+    for (const MismatchRecord& found : tables.mismatches_of(job->id)) {
+      liars[{found.stage, found.shard}] = found.liar;
+    }
+    for (const Trouble& trouble : job->troubles) {
+      const auto found = liars.find({trouble.stage, trouble.shard});
+      require(found != liars.end() && found->second == trouble.liar,
+              "{} tells of results that differ, and its journal does not",
+              text_of(job->id, trouble.stage, trouble.shard));
+      liars.erase(found);
+    }
+    require(liars.empty(), "results of {} differed, which is forgotten", job->id);
+  }
 }
 
 // Each result is taken once: a second one is recorded only where the first was lost or dropped.

@@ -102,7 +102,7 @@ void CoordinatorModel::load() {
   for (const JobRow& job : unfinished) {
     process_->files[job.id].fabric = job.fabric;
     apply(SubmitEvent{job.id, job.fabric.name, job.fingerprint, job.submitted_at, job.demands,
-                      job.is_paused},
+                      job.is_paused, tables.mismatches_of(job.id)},
           nullptr);
   }
   checks_.loaded(process_->queue, tables);
@@ -218,8 +218,8 @@ void CoordinatorModel::submit(const JobRow& job, Done done) {
   row.order = journal_.tables().jobs.size();
   process_->files[job.id].fabric = job.fabric;
   ground_.say("{} is submitted: {}", job.id, job.fabric.name);
-  const SubmitEvent event{job.id,           job.fabric.name, std::nullopt,
-                          row.submitted_at, job.demands,     job.is_paused};
+  const SubmitEvent event{
+      job.id, job.fabric.name, std::nullopt, row.submitted_at, job.demands, job.is_paused, {}};
   when_durable(apply(event, nullptr, {row}), std::move(done));
 }
 
@@ -236,8 +236,8 @@ void CoordinatorModel::retry(const std::string& job, Done done) {
   }
   ground_.say("{} is tried again", job);
   process_->files[job] = JobFile{row.fabric, {}, 0, {}};
-  const SubmitEvent event{job,  row.fabric.name, row.fingerprint, row.submitted_at, row.demands,
-                          false};
+  const SubmitEvent event{
+      job, row.fabric.name, row.fingerprint, row.submitted_at, row.demands, false, {}};
   std::vector<Row> rows{RetryRow{job}};
   when_durable(apply(event, nullptr, std::move(rows)), std::move(done));
 }

@@ -38,6 +38,7 @@ struct Apply {
     job.error.clear();
     job.is_paused = false;
     std::erase_if(tables.failures, [&](const FailureRecord& f) { return f.job == row.job; });
+    std::erase_if(tables.mismatches, [&](const MismatchRecord& m) { return m.job == row.job; });
   }
   void operator()(const ForgetRow& row) const {
     std::erase_if(tables.results, [&](const auto& r) { return r.second.result == row.result; });
@@ -75,12 +76,28 @@ struct Apply {
   }
   void operator()(const AttemptRecord& row) const { tables.attempts[row.attempt] = row; }
   void operator()(const AttemptEndRecord& row) const { tables.attempts.erase(row.attempt); }
-  void operator()(const MismatchRecord& /*row*/) const {}
+  void operator()(const MismatchRecord& row) const {
+    std::erase_if(tables.mismatches, [&](const MismatchRecord& open) {
+      return open.job == row.job && open.stage == row.stage && open.shard == row.shard &&
+             open.liar.empty();
+    });
+    tables.mismatches.push_back(row);
+  }
 };
 
 }  // namespace
 
 void Tables::apply(const Row& row) { std::visit(Apply{*this}, row); }
+
+std::vector<MismatchRecord> Tables::mismatches_of(const std::string& job) const {
+  std::vector<MismatchRecord> found;
+  for (const MismatchRecord& mismatch : mismatches) {
+    if (mismatch.job == job) {
+      found.push_back(mismatch);
+    }
+  }
+  return found;
+}
 
 std::uint64_t JournalDisk::append(std::vector<Row> rows) {
   if (rows.empty()) {

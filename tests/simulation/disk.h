@@ -81,12 +81,15 @@ struct Tables {
   std::map<std::string, JobRow> jobs;
   std::map<core::Digest, KeptResult> results;  // by work
   std::vector<coordinator::FailureRecord> failures;
+  std::vector<coordinator::MismatchRecord> mismatches;
   std::map<std::uint64_t, coordinator::AttemptRecord> attempts;  // that have not ended
   std::map<std::pair<std::string, StageName>, bool> blocks;      // whether for lies
   std::set<std::string> drained;
   std::vector<std::pair<std::string, core::Digest>> versions;  // fabric, database
 
   void apply(const Row& row);
+  [[nodiscard]] std::vector<coordinator::MismatchRecord> mismatches_of(
+      const std::string& job) const;
 };
 
 // Rows are queued by append() and made durable group by group: begin_sync(), then end_sync().
