@@ -82,6 +82,20 @@ std::string shards_text(const v1::AttemptInfo& attempt) {
                                : fmt::format("{}-{}", attempt.first_shard(), last);
 }
 
+// What is to be said of an attempt beside its outcome: that it was given up for a while, and why it
+// failed or what it logged last.
+std::string remark(const v1::AttemptInfo& attempt) {
+  const std::string last = attempt.message().empty() ? attempt.last_line() : attempt.message();
+  if (attempt.taken_up() == 0) {
+    return last;
+  }
+  const std::string times =
+      attempt.taken_up() == 1 ? "" : fmt::format(" ({} times in all)", attempt.taken_up());
+  return fmt::format("{} at {}, taken up again at {}{}{}{}", attempt.earlier_outcome(),
+                     time_text(attempt.earlier_ended_at_ms()), time_text(attempt.taken_up_at_ms()),
+                     times, last.empty() ? "" : "; ", last);
+}
+
 void list(const LogsOptions& options) {
   Client client(options.coordinator);
   const v1::ListAttemptsResponse response = client.call(
@@ -95,8 +109,7 @@ void list(const LogsOptions& options) {
   for (const v1::AttemptInfo& attempt : response.attempts()) {
     table.add({std::to_string(attempt.name().attempt()), attempt.stage(), shards_text(attempt),
                attempt.worker(), attempt.purpose(), attempt.outcome(),
-               time_text(attempt.began_at_ms()),
-               attempt.message().empty() ? attempt.last_line() : attempt.message()});
+               time_text(attempt.began_at_ms()), remark(attempt)});
   }
   fmt::print("{}", table.text());
 }

@@ -270,6 +270,33 @@ TEST_F(JournalTest, EndedJob_HasNoFailuresAndNoRunningAttempts_AndCanBeRetried) 
   EXPECT_EQ(journal.jobs(0).size(), 1U);
 }
 
+TEST_F(JournalTest, AttemptThatIsTakenUpAgain_KeepsHowItHadEnded) {
+  Journal journal(file());
+  const AttemptRecord begun{"a", 1, StageName::kGrid, 0, 1, "i", "w", Purpose::kFirst, 5};
+  AttemptRecord again = begun;
+  again.began_at_ms = 70;
+  journal.append(
+      {job("a"), begun, AttemptEndRecord{"a", 1, Outcome::kLost, 0, "silent", 40}, again});
+  const auto any = [](const AttemptRecord&) { return true; };
+  KeptAttempt kept = journal.attempts_of("a", 10, any).at(0);
+  EXPECT_FALSE(kept.end.has_value());
+  EXPECT_EQ(kept.begin.began_at_ms, 5);
+  EXPECT_EQ(kept.taken_up, 1U);
+  EXPECT_EQ(kept.taken_up_at_ms, 70);
+  EXPECT_EQ(kept.earlier_outcome, Outcome::kLost);
+  EXPECT_EQ(kept.earlier_ended_at_ms, 40);
+  EXPECT_EQ(journal.running_attempts("a", StageName::kGrid).size(), 1U);
+  again.began_at_ms = 90;  // said again though it runs: nothing has happened to it
+  journal.append({again});
+  EXPECT_EQ(journal.attempts_of("a", 10, any).at(0).taken_up, 1U);
+  journal.append({AttemptEndRecord{"a", 1, Outcome::kSucceeded, 1, "", 100}});
+  kept = journal.attempts_of("a", 10, any).at(0);
+  ASSERT_TRUE(kept.end.has_value());
+  EXPECT_EQ(kept.end->outcome, Outcome::kSucceeded);
+  EXPECT_EQ(kept.earlier_outcome, Outcome::kLost);
+  EXPECT_EQ(kept.earlier_ended_at_ms, 40);
+}
+
 TEST_F(JournalTest, EndedAttempts_AreKeptUpToALimit) {
   const std::uint64_t count = 2 * kEndedAttemptsLimit;
   const auto any = [](const AttemptRecord&) { return true; };
@@ -372,6 +399,26 @@ TEST_F(JournalTest, FileOfSchema1_IsBroughtUpToDate) {
   Journal journal(file());
   EXPECT_TRUE(journal.job("a")->is_paused);
   EXPECT_EQ(known_results(journal, 3), 1);
+}
+
+TEST_F(JournalTest, FileOfSchema2_IsBroughtUpToDate) {
+  {
+    Journal journal(file());
+    journal.append({job("a"),
+                    AttemptRecord{"a", 1, StageName::kGrid, 0, 1, "i", "w", Purpose::kFirst, 5},
+                    AttemptEndRecord{"a", 1, Outcome::kLost, 0, "silent", 40}});
+    journal.wait(journal.append({}));
+  }
+  for (const char* column :
+       {"taken_up", "taken_up_at_ms", "earlier_outcome", "earlier_ended_at_ms"}) {
+    Connection(file()).run((std::string("ALTER TABLE attempts DROP COLUMN ") + column).c_str());
+  }
+  Connection(file()).run("UPDATE meta SET value = 2 WHERE key = 'schema'");
+  Journal journal(file());
+  const KeptAttempt kept =
+      journal.attempts_of("a", 10, [](const AttemptRecord&) { return true; }).at(0);
+  EXPECT_EQ(kept.end->outcome, Outcome::kLost);
+  EXPECT_EQ(kept.taken_up, 0U);
 }
 
 TEST_F(JournalTest, FileOfANewerSchema_IsRefusedAndLeftAlone) {

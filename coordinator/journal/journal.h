@@ -69,6 +69,12 @@ using Record = std::variant<JobRecord, JobEndRecord, RetryRecord, PauseRecord, P
 struct KeptAttempt {
   AttemptRecord begin;
   std::optional<AttemptEndRecord> end;
+  // It had ended and its worker took it up again: how often, and of the last time when, and how and
+  // when it had ended.
+  std::uint32_t taken_up = 0;
+  std::int64_t taken_up_at_ms = 0;
+  Outcome earlier_outcome = Outcome::kLost;
+  std::int64_t earlier_ended_at_ms = 0;
 };
 
 // The result of a shard's work.

@@ -55,7 +55,7 @@ std::string select_jobs(const char* rest) {
 
 constexpr const char* kAttemptColumns =
     "attempt, stage, first_shard, shards, worker, worker_name, purpose, began_at_ms, ended_at_ms, "
-    "outcome, shards_done, message";
+    "outcome, shards_done, message, taken_up, taken_up_at_ms, earlier_outcome, earlier_ended_at_ms";
 
 AttemptRecord attempt_of(const std::string& job, const Statement& s) {
   AttemptRecord attempt;
@@ -178,7 +178,8 @@ std::vector<KeptAttempt> Journal::attempts_of(
   s.text(job);
   std::vector<KeptAttempt> attempts;
   while (attempts.size() < limit && s.step()) {
-    KeptAttempt attempt{attempt_of(job, s), std::nullopt};
+    KeptAttempt attempt;
+    attempt.begin = attempt_of(job, s);
     if (!wanted(attempt.begin)) {
       continue;
     }
@@ -190,6 +191,10 @@ std::vector<KeptAttempt> Journal::attempts_of(
                                      s.bytes_of(11),
                                      s.signed_of(8)};
     }
+    attempt.taken_up = static_cast<std::uint32_t>(s.number_of(12));
+    attempt.taken_up_at_ms = s.signed_of(13);
+    attempt.earlier_outcome = static_cast<Outcome>(s.number_of(14));
+    attempt.earlier_ended_at_ms = s.signed_of(15);
     attempts.push_back(std::move(attempt));
   }
   return attempts;

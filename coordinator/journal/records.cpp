@@ -188,7 +188,7 @@ void RecordWriter::put(const BlockRecord& block) {
 
 void RecordWriter::put(const AttemptRecord& attempt) {
   Statement(connection_,
-            "INSERT OR REPLACE INTO attempts(job, attempt, stage, first_shard, shards, worker, "
+            "INSERT OR IGNORE INTO attempts(job, attempt, stage, first_shard, shards, worker, "
             "worker_name, purpose, began_at_ms) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .text(attempt.job)
       .number(attempt.attempt)
@@ -200,6 +200,25 @@ void RecordWriter::put(const AttemptRecord& attempt) {
       .number(code_of(attempt.purpose))
       .number(stored(attempt.began_at_ms))
       .step();
+  if (connection_.changed_rows() == 0) {
+    take_up(attempt);
+  }
+}
+
+// The attempt is there: where it has ended, it goes on. How it had ended stays.
+void RecordWriter::take_up(const AttemptRecord& attempt) {
+  Statement(connection_,
+            "UPDATE attempts SET worker = ?, worker_name = ?, taken_up = taken_up + 1, "
+            "taken_up_at_ms = ?, earlier_outcome = outcome, earlier_ended_at_ms = ended_at_ms, "
+            "ended_at_ms = 0, outcome = 0, shards_done = 0, message = '' "
+            "WHERE job = ? AND attempt = ? AND ended_at_ms <> 0")
+      .text(attempt.worker)
+      .text(attempt.worker_name)
+      .number(stored(attempt.began_at_ms))
+      .text(attempt.job)
+      .number(attempt.attempt)
+      .step();
+  ended_attempts_[attempt.job] -= connection_.changed_rows();
 }
 
 void RecordWriter::put(const AttemptEndRecord& end) {

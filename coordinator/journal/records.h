@@ -37,6 +37,7 @@ class RecordWriter {
   void put(const AttemptRecord& attempt);
   void put(const AttemptEndRecord& end);
   void put(const MismatchRecord& mismatch);
+  void take_up(const AttemptRecord& attempt);
   void forget_failures(const std::string& job);
   void forget_mismatches(const std::string& job);
   void prune_attempts(const std::string& job);

@@ -9,7 +9,7 @@ namespace weft::coordinator {
 
 namespace {
 
-constexpr std::int64_t kSchema = 2;
+constexpr std::int64_t kSchema = 3;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE IF NOT EXISTS meta(key TEXT PRIMARY KEY, value INTEGER NOT NULL) WITHOUT ROWID;
@@ -36,6 +36,8 @@ CREATE TABLE IF NOT EXISTS attempts(
   worker_name TEXT NOT NULL, purpose INTEGER NOT NULL, began_at_ms INTEGER NOT NULL,
   ended_at_ms INTEGER NOT NULL DEFAULT 0, outcome INTEGER NOT NULL DEFAULT 0,
   shards_done INTEGER NOT NULL DEFAULT 0, message TEXT NOT NULL DEFAULT '',
+  taken_up INTEGER NOT NULL DEFAULT 0, taken_up_at_ms INTEGER NOT NULL DEFAULT 0,
+  earlier_outcome INTEGER NOT NULL DEFAULT 0, earlier_ended_at_ms INTEGER NOT NULL DEFAULT 0,
   PRIMARY KEY(job, attempt)) WITHOUT ROWID;
 CREATE INDEX IF NOT EXISTS attempts_running ON attempts(job, stage) WHERE ended_at_ms = 0;
 CREATE TABLE IF NOT EXISTS blocks(
@@ -64,6 +66,14 @@ ALTER TABLE results ADD COLUMN audited_by TEXT NOT NULL DEFAULT '';
 ALTER TABLE failures ADD COLUMN kind INTEGER NOT NULL DEFAULT 0;
 )sql";
 
+// Schema 2 did not keep how an attempt had ended that was taken up again.
+constexpr const char* kFromSchema2 = R"sql(
+ALTER TABLE attempts ADD COLUMN taken_up INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE attempts ADD COLUMN taken_up_at_ms INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE attempts ADD COLUMN earlier_outcome INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE attempts ADD COLUMN earlier_ended_at_ms INTEGER NOT NULL DEFAULT 0;
+)sql";
+
 // 0: a new file.
 std::int64_t schema_of(Connection& connection) {
   Statement has_meta(connection, "SELECT 1 FROM sqlite_schema WHERE name = 'meta'");
@@ -86,6 +96,8 @@ void make_schema(Connection& connection) {
   }
   if (schema == 1) {
     connection.run(kFromSchema1);
+  } else if (schema == 2) {
+    connection.run(kFromSchema2);
   }
   connection.run(kTables);
   JournalCatalogue::create_tables(connection);

@@ -171,6 +171,12 @@ v1::AttemptInfo message_of(const KeptAttempt& attempt) {
     message.set_ended_at_ms(attempt.end->ended_at_ms);
     message.set_shards_done(attempt.end->shards_done);
   }
+  if (attempt.taken_up > 0) {
+    message.set_taken_up(attempt.taken_up);
+    message.set_taken_up_at_ms(attempt.taken_up_at_ms);
+    message.set_earlier_outcome(to_string(attempt.earlier_outcome));
+    message.set_earlier_ended_at_ms(attempt.earlier_ended_at_ms);
+  }
   return message;
 }
 
