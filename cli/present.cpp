@@ -48,6 +48,7 @@ std::string state_text(v1::JobState state) {
 std::string condition_text(const v1::Worker& worker) {
   std::string text = worker.lost() ? "lost" : "live";
   text += worker.drained() ? ", drained" : "";
+  text += worker.undelivered().empty() ? "" : ", cannot deliver";
   for (int i = 0; i < worker.blocked_stages_size(); ++i) {
     text += (i == 0 ? ", blocked for " : ", ") + worker.blocked_stages(i);
   }

@@ -3,16 +3,21 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <random>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include "core/digest.h"
+#include "core/error.h"
+#include "core/file.h"
 #include "tests/cli_answer_dropper.h"
 #include "tests/cli_fault_cluster.h"
 
@@ -66,6 +71,20 @@ class Faults : public testing::Test {
       EXPECT_LE(times, held[shard]) << shard.first << "/" << shard.second;
     }
     EXPECT_EQ(computed.size(), FaultCluster::shards_done(job));
+  }
+  static void expect_nothing_lost_or_computed_again(FaultCluster& cluster) {
+    std::map<std::pair<std::string, std::uint64_t>, std::uint64_t> allowed;
+    for (const v1::AttemptInfo& attempt : cluster.attempts()) {
+      EXPECT_NE(attempt.outcome(), "lost") << attempt.ShortDebugString();
+      EXPECT_EQ(attempt.taken_up(), 0U) << attempt.ShortDebugString();
+      // On a busy machine a run may be so slow that an idle worker is given it, too.
+      for (std::uint64_t i = 0; attempt.purpose() == "speculation" && i < attempt.shards(); ++i) {
+        ++allowed[{attempt.stage(), attempt.first_shard() + i}];
+      }
+    }
+    for (const auto& [shard, times] : cluster.computed()) {
+      EXPECT_LE(times, 1 + allowed[shard]) << shard.first << "/" << shard.second;
+    }
   }
   static void pause(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
 
@@ -168,17 +187,7 @@ TEST_F(Faults, WhileTheCoordinatorIsAwayWorkersGoOnAndNothingIsDoneAgain) {
   const v1::Job job = cluster.wait_for_end();
   expect_success(job);
   expect_no_more_than_attempts(cluster, job);
-  std::map<std::pair<std::string, std::uint64_t>, std::uint64_t> allowed;  // computed again
-  for (const v1::AttemptInfo& attempt : cluster.attempts()) {
-    EXPECT_NE(attempt.outcome(), "lost") << attempt.ShortDebugString();
-    // On a busy machine a run may be so slow that an idle worker is given it, too.
-    for (std::uint64_t i = 0; attempt.purpose() == "speculation" && i < attempt.shards(); ++i) {
-      ++allowed[{attempt.stage(), attempt.first_shard() + i}];
-    }
-  }
-  for (const auto& [shard, times] : cluster.computed()) {
-    EXPECT_LE(times, 1 + allowed[shard]) << shard.first << "/" << shard.second;
-  }
+  expect_nothing_lost_or_computed_again(cluster);
   if (HasFailure()) {
     cluster.tell_all();
   }
@@ -255,10 +264,79 @@ TEST_F(Faults, ACoordinatorWithAFullDiskStopsAndGoesOnWhenThereIsRoom) {
   const auto code = cluster.coordinator().wait(60);
   ASSERT_TRUE(code) << "it goes on though its journal cannot be written";
   EXPECT_EQ(*code, 1);
+  pause(2000);  // what is computed now stays with the workers
   cluster.start_coordinator();
   const v1::Job job = cluster.wait_for_end();
   expect_success(job);
   expect_no_more_than_attempts(cluster, job);
+  expect_nothing_lost_or_computed_again(cluster);
+  if (HasFailure()) {
+    cluster.tell_all();
+  }
+}
+
+// Where blobs would go stand files, so that no new result can be stored while the journal is well.
+class NoRoomForBlobs {
+ public:
+  explicit NoRoomForBlobs(std::filesystem::path blobs) : blobs_(std::move(blobs)) {
+    for (int i = 0; i < 256; ++i) {
+      const std::filesystem::path folder = blobs_ / fmt::format("{:02x}", i);
+      if (std::filesystem::exists(folder)) {
+        continue;
+      }
+      try {
+        core::write_file_atomically(folder, "");
+        in_the_way_.push_back(folder);
+      } catch (const core::Error&) {
+        EXPECT_TRUE(std::filesystem::is_directory(folder));  // the coordinator has just made it
+      }
+    }
+  }
+  void clear() {
+    for (const std::filesystem::path& file : in_the_way_) {
+      std::filesystem::remove(file);
+    }
+    in_the_way_.clear();
+  }
+
+ private:
+  std::filesystem::path blobs_;
+  std::vector<std::filesystem::path> in_the_way_;
+};
+
+TEST_F(Faults, WhatTheCoordinatorHasNoRoomForIsDeliveredWhenThereIs) {
+  FaultCluster cluster(folder_.path() / "full-blobs", 2, "9");
+  cluster.start_worker(0);
+  cluster.start_worker(1);
+  cluster.submit(folder_, description_);
+  ASSERT_EQ(cluster.wait_for_transfer().ended_at_ms(), 0);
+  NoRoomForBlobs full(cluster.path("state/blobs"));
+  const auto waits = [&](std::size_t worker) {
+    return cluster.worker_log(worker).find("event=cannot_deliver") != std::string::npos;
+  };
+  for (int i = 0; i < 600 && !(waits(0) && waits(1)); ++i) {
+    pause(100);
+  }
+  EXPECT_TRUE(waits(0) && waits(1));
+  const Finished workers =
+      run_weft(folder_, {"workers", "--json", "--coordinator", cluster.address()});
+  ASSERT_EQ(workers.code, 0) << workers.err;
+  for (const auto& worker : workers.json()) {
+    EXPECT_NE(worker.at("undelivered").get<std::string>().find("cannot store"), std::string::npos)
+        << worker;
+  }
+  pause(3000);
+  full.clear();
+  const v1::Job job = cluster.wait_for_end();
+  expect_success(job);
+  expect_no_more_than_attempts(cluster, job);
+  expect_nothing_lost_or_computed_again(cluster);
+  for (const v1::AttemptInfo& attempt : cluster.attempts()) {
+    EXPECT_NE(attempt.outcome(), "failed") << attempt.ShortDebugString();
+  }
+  if (HasFailure()) {
+    cluster.tell_all();
+  }
 }
 
 TEST_F(Faults, AnswersThatAreLostChangeNothing) {

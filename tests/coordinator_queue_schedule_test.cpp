@@ -310,6 +310,29 @@ TEST_F(QueueWatch, AttemptWithoutProgress_IsTakenAway) {
   EXPECT_EQ(idle_.held.size(), 1U);
 }
 
+TEST_F(QueueWatch, WorkerThatCannotDeliver_IsNeitherSlowNorHungAndGetsNothing) {
+  begin_slow_run();
+  cluster_.submit("b", {9});
+  worker_.says().undelivered = "there is no room";
+  for (int i = 0; i < 3; ++i) {
+    wait(300'000);
+    EXPECT_EQ(worker_.sync(1).leases.size(), 1U);
+    EXPECT_EQ(worker_.held.size(), 1U) << "it was given more";
+  }
+  worker_.says().undelivered.clear();
+  wait(1'000);
+  EXPECT_EQ(worker_.held.size(), 1U) << "it was taken away";
+  QueueWorker late(cluster_, "late", 2);
+  late.sync(2);
+  for (const AssignAction& assign : late.held) {
+    EXPECT_NE(assign.purpose, Purpose::kSpeculation) << "the time that it waited counts";
+  }
+  worker_.finish();
+  worker_.sync();
+  EXPECT_TRUE(cluster_.job("a").stages[0].is_done());
+  EXPECT_EQ(cluster_.job("a").speculative_attempts, 0U);
+}
+
 TEST_F(QueueWatch, ClockThatJumps_EndsNoLease) {
   cluster_.submit("a", {1});
   worker_.sync(1);

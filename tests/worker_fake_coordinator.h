@@ -51,10 +51,10 @@ class FakeCoordinator : public v1::WorkerService::Service, public v1::BlobServic
     to_say_.push_back(response);
     changed_.notify_all();
   }
-  // Blobs are not taken until further notice.
-  void refuse_blobs(bool is_refused) {
+  // Blobs are not taken until further notice: as by one that is away, or has no room for them.
+  void refuse_blobs(bool is_refused, grpc::StatusCode why = grpc::StatusCode::UNAVAILABLE) {
     const std::lock_guard lock(mutex_);
-    is_refusing_ = is_refused;
+    refusal_ = is_refused ? why : grpc::StatusCode::OK;
   }
 
   // The requests so far, and further ones until `is_it` holds for one of them; that one, or an
@@ -146,8 +146,8 @@ class FakeCoordinator : public v1::WorkerService::Service, public v1::BlobServic
       data += request.data();
     }
     const std::lock_guard lock(mutex_);
-    if (is_refusing_) {
-      return {grpc::StatusCode::UNAVAILABLE, "not now"};
+    if (refusal_ != grpc::StatusCode::OK) {
+      return {refusal_, "not now"};
     }
     if (core::digest_of(data).binary() != digest) {
       return {grpc::StatusCode::DATA_LOSS, "other bytes"};
@@ -164,7 +164,7 @@ class FakeCoordinator : public v1::WorkerService::Service, public v1::BlobServic
   std::vector<v1::SynchronizeRequest> requests_;
   std::map<std::string, std::string> blobs_;
   std::map<std::uint64_t, std::string> logs_;
-  bool is_refusing_ = false;
+  grpc::StatusCode refusal_ = grpc::StatusCode::OK;
   std::unique_ptr<grpc::Server> server_;
   std::shared_ptr<grpc::Channel> channel_;
 };

@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 // Threads of bakers that wait for a test.
 struct Gate {
   std::atomic<bool> is_open{false};
+  std::atomic<int> begun{0};
   std::atomic<int> inside{0};
 };
 
@@ -35,6 +36,7 @@ class FakeBaker : public Baker {
     if (shard == 13) {
       throw core::Error(core::Code::kInvalidArgument, "thirteen is not to be had");
     }
+    ++gate_->begun;
     ++gate_->inside;
     while (shard >= 100 && !gate_->is_open.load()) {
       std::this_thread::sleep_for(kStep);
@@ -234,6 +236,48 @@ TEST_F(LeaseLoopTest, ResultsThatCouldNotBeUploadedAreReportedByTheNextWorker) {
   EXPECT_EQ(listed.running_size(), 0) << "it owns nothing of it";
   end();
   EXPECT_TRUE(fs::is_empty(spool_root()));
+}
+
+TEST_F(LeaseLoopTest, WhatTheCoordinatorHasNoRoomForIsKeptAndDeliveredLater) {
+  coordinator_.refuse_blobs(true, grpc::StatusCode::RESOURCE_EXHAUSTED);
+  coordinator_.say(giving(1, 3, 2));
+  start();
+  const v1::SynchronizeRequest stuck =
+      coordinator_.wait_for([](const auto& r) { return !r.undelivered().empty(); });
+  EXPECT_NE(stuck.undelivered().find("not now"), std::string::npos) << stuck.undelivered();
+  EXPECT_EQ(stuck.free_attempts(), 0U) << "it takes nothing more";
+  EXPECT_EQ(stuck.running_size(), 1) << "the attempt is still its own";
+  EXPECT_EQ(stuck.completions_size(), 0);
+  const v1::SynchronizeRequest still =
+      coordinator_.wait_for([&](const auto& r) { return r.sequence() >= stuck.sequence() + 3; });
+  EXPECT_FALSE(still.undelivered().empty());
+  EXPECT_EQ(still.running_size(), 1);
+
+  coordinator_.refuse_blobs(false);
+  const v1::Completion completion = completion_of(1);
+  EXPECT_EQ(completion.results_size(), 2);
+  EXPECT_FALSE(completion.has_error());
+  EXPECT_TRUE(coordinator_.has_blob(core::digest_of("result 3")));
+  EXPECT_TRUE(coordinator_.has_blob(core::digest_of("result 4")));
+  EXPECT_EQ(gate_->begun.load(), 2) << "something was computed again";
+  const v1::SynchronizeRequest free = coordinator_.wait_for(
+      [&](const auto& r) { return r.sequence() > still.sequence() && r.undelivered().empty(); });
+  EXPECT_GT(free.free_attempts(), 0U) << "it takes work again";
+  end();
+  EXPECT_TRUE(fs::is_empty(spool_root()));
+}
+
+TEST_F(LeaseLoopTest, WhatTheCoordinatorHasNoRoomForOutlivesTheWorker) {
+  coordinator_.refuse_blobs(true, grpc::StatusCode::RESOURCE_EXHAUSTED);
+  coordinator_.say(giving(1, 3, 1));
+  start();
+  EXPECT_FALSE(
+      coordinator_.wait_for([](const auto& r) { return !r.undelivered().empty(); }).name().empty());
+  end();  // gives up after some seconds
+  coordinator_.refuse_blobs(false);
+  start();
+  EXPECT_EQ(completion_of(1).results_size(), 1);
+  EXPECT_EQ(gate_->begun.load(), 1);
 }
 
 TEST_F(LeaseLoopTest, WhatWasUploadedButNotAcknowledgedIsReportedByTheNextWorker) {

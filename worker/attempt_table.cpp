@@ -64,6 +64,13 @@ void AttemptTable::fill(v1::SynchronizeRequest& request) const {
     *request.add_completions() = completion;
   }
   request.set_free_attempts(free_attempts());
+  request.set_undelivered(undelivered_);
+}
+
+bool AttemptTable::set_undelivered(std::string why) {
+  const bool is_news = undelivered_.empty() != why.empty();
+  undelivered_ = std::move(why);
+  return is_news;
 }
 
 std::uint32_t AttemptTable::free_attempts() const {
@@ -75,7 +82,7 @@ std::uint32_t AttemptTable::free_attempts() const {
     ahead += !attempt->is_closing && attempt->begun < attempt->assignment.shards() ? 1 : 0;
   }
   const std::uint64_t limit = std::min<std::uint64_t>(threads_ + 1, v1::kFreeAttemptsLimit);
-  if (is_draining_ || held >= limit || ahead >= kWantedAhead ||
+  if (is_draining_ || !undelivered_.empty() || held >= limit || ahead >= kWantedAhead ||
       completions_.size() >= static_cast<std::size_t>(v1::kCompletionLimit) / 2) {
     return 0;
   }

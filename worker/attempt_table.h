@@ -77,6 +77,10 @@ class AttemptTable {
   bool failed(const ShardClaim& claim, v1::TaskError error);
   bool given_up(const ShardClaim& claim);
 
+  // What keeps results from being delivered, in words: nothing more is asked for meanwhile. Empty:
+  // nothing. Says whether that is news to the coordinator.
+  bool set_undelivered(std::string why);
+
   // Begins nothing more, asks running shards to stop, and takes no further attempts.
   void drain();
 
@@ -98,6 +102,7 @@ class AttemptTable {
 
   unsigned threads_;
   bool is_draining_ = false;
+  std::string undelivered_;
   std::vector<std::shared_ptr<Attempt>> attempts_;  // in the order they came
   std::map<Name, v1::Completion> completions_;
   std::vector<v1::AttemptName> forgotten_;

@@ -99,6 +99,8 @@ class LeaseLoop {
   void fail(const ShardClaim& claim, v1::ErrorKind kind, const std::string& message);
   void upload();
   void upload(const SpoolItem& item);
+  void deliver(const SpoolItem& item);
+  void set_undelivered(const std::string& why);
 
   // housekeeping (lease_loop_house.cpp)
   void keep_house();

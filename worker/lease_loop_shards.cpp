@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <new>
 #include <optional>
 #include <utility>
@@ -8,6 +9,7 @@
 
 #include "core/error.h"
 #include "proto/limits.h"
+#include "worker/back_off.h"
 #include "worker/lease_loop.h"
 
 // The worker's threads that compute shards and store their results.
@@ -15,6 +17,8 @@
 namespace weft::worker {
 
 namespace {
+
+constexpr std::chrono::milliseconds kLongestUndelivered{15'000};
 
 std::uint64_t whole_ms(double seconds) { return static_cast<std::uint64_t>(seconds * 1000 + 0.5); }
 
@@ -190,9 +194,49 @@ void LeaseLoop::upload() {
   }
 }
 
+// Gives a result to the coordinator. One that it has no room for has cost time: it stays in the
+// scratch folder until there is room, and nothing more is asked for meanwhile.
+void LeaseLoop::deliver(const SpoolItem& item) {
+  const auto should_stop = [this] { return is_giving_up_.load(); };
+  const std::string bytes = Spool::read(item);
+  BackOff back_off(kLongestUndelivered);
+  while (true) {
+    try {
+      blobs_.write(item.result.digest, bytes, should_stop);
+      set_undelivered("");
+      return;
+    } catch (const core::Error& error) {
+      const bool has_no_room = error.code() == core::Code::kResourceExhausted;
+      if (!has_no_room || bytes.size() > v1::kBlobLimitBytes) {
+        throw;
+      }
+      set_undelivered(error.what());
+    }
+    back_off.wait(should_stop);
+  }
+}
+
+void LeaseLoop::set_undelivered(const std::string& why) {
+  bool is_news = false;
+  {
+    const std::lock_guard lock(mutex_);
+    is_news =
+        table_.set_undelivered(std::string(beginning_of(printable(why), v1::kErrorTextLimitBytes)));
+  }
+  if (!is_news) {
+    return;
+  }
+  if (why.empty()) {
+    spdlog::info("worker={} event=delivers_again", id_);
+  } else {
+    spdlog::warn("worker={} event=cannot_deliver error=\"{}\"", id_, why);
+  }
+  tell_news();
+}
+
 void LeaseLoop::upload(const SpoolItem& item) {
   try {
-    blobs_.write(item.result.digest, Spool::read(item), [this] { return is_giving_up_.load(); });
+    deliver(item);
   } catch (const core::Error& error) {
     if (error.code() == core::Code::kCancelled) {
       spool_.kept(item);

@@ -307,6 +307,15 @@ v1::ExplainResponse explain_worker(const Queue& queue, const WorkerState& worker
     reasons.add_of_worker(reason::kDrained, "it is drained: it gets nothing new",
                           "weft drain --undo " + worker.name, worker);
   }
+  if (!worker.undelivered.empty()) {
+    reasons.add_of_worker(reason::kBackingOff,
+                          "it has results that it cannot deliver, keeps them and takes nothing "
+                          "more: " +
+                              worker.undelivered,
+                          "make room where the coordinator keeps its state; nothing is computed "
+                          "again",
+                          worker);
+  }
   for (const StageName stage : queue.blocked_stages(worker.name)) {
     const bool is_liar = queue.is_liar(worker.name, stage);
     reasons.add_of_worker(

@@ -153,6 +153,7 @@ void Queue::enter(const ReportEvent& report, Time now, Actions& actions) {
   worker.labels = report.labels;
   worker.wall_left_ms = report.wall_left_ms;
   worker.scenes = report.scenes;
+  worker.undelivered = report.undelivered;
   count(worker, now);
   if (is_news) {
     bind_jobs(now, actions);
@@ -333,6 +334,10 @@ void Queue::keep(const ReportEvent& report, const RunningClaim& claim, Time now,
   }
   if (attempt.shards_done != claim.shards_done || attempt.progress != claim.progress) {
     attempt.progress_at = now;
+  }
+  if (!report.undelivered.empty()) {  // it waits for us: that time does not count
+    attempt.progress_at = now;
+    attempt.active_at = attempt.active_at == Time{} ? Time{} : now;
   }
   attempt.shards_done = claim.shards_done;
   attempt.progress = claim.progress;

@@ -181,6 +181,7 @@ struct WorkerState {
   std::vector<std::string> labels;
   std::uint64_t wall_left_ms = 0;  // when it was last seen; 0: no limit
   std::vector<core::Digest> scenes;
+  std::string undelivered;       // what keeps its results from us; empty: nothing
   std::uint64_t superseded = 0;  // attempts of which it reported when they were no longer its own
   // Attempts about which all was said, for as long as the worker goes on naming them.
   std::set<std::uint64_t> settled;

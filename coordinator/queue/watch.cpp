@@ -25,6 +25,9 @@ void Queue::watch_worker(const std::set<std::uint64_t>& attempts, Time now,
                          std::vector<std::uint64_t>* hung) {
   using Ms = std::chrono::duration<double, std::milli>;
   const auto worker = workers_.find(attempts_.at(*attempts.begin()).worker);
+  if (worker != workers_.end() && !worker->second.undelivered.empty()) {
+    return;  // it waits for us
+  }
   const std::uint32_t threads = worker == workers_.end() ? 1 : worker->second.threads;
   double free_in_ms = -1e18;  // from now, when the attempts before are done
   bool is_known = true;       // how long these take

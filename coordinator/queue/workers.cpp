@@ -124,6 +124,9 @@ Hindrance Queue::hindrance(const WorkerState& worker, const JobState& job, const
     return {backoff->second.is_short ? Obstacle::kShort : Obstacle::kFailing,
             backoff->second.until};
   }
+  if (!worker.undelivered.empty()) {
+    return {Obstacle::kShort, {}};
+  }
   if (lacks_memory(worker, stage)) {
     return {Obstacle::kMemoryHeld, {}};
   }

@@ -133,6 +133,7 @@ ReportEvent report_from(const v1::SynchronizeRequest& request) {
   }
   report.labels.assign(request.labels().begin(), request.labels().end());
   report.wall_left_ms = request.wall_left_ms();
+  report.undelivered = request.undelivered().substr(0, v1::kErrorTextLimitBytes);
   for (const std::string& scene : request.scenes()) {
     report.scenes.push_back(digest_from(scene, "scenes"));
   }

@@ -198,6 +198,7 @@ v1::Worker message_of(const Queue& queue, const WorkerState& worker, Time now) {
   message.mutable_labels()->Assign(worker.labels.begin(), worker.labels.end());
   message.set_wall_left_ms(worker.wall_left_ms);
   message.set_superseded(worker.superseded);
+  message.set_undelivered(worker.undelivered);
   for (const auto& [id, attempt] : queue.attempts()) {
     if (attempt.worker != worker.id) {
       continue;
