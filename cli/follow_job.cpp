@@ -75,6 +75,11 @@ class JobFollower {
     for (; troubles_shown_ < job_.troubles_size(); ++troubles_shown_) {
       printer_.note(trouble_text(job_.troubles(troubles_shown_)));
     }
+    const std::string audits = audits_text(job_);
+    if (!audits.empty() && audits != audits_shown_) {
+      audits_shown_ = audits;
+      printer_.note(audits);
+    }
     if (job_.state() == v1::JOB_STATE_COMMITTING && !is_committing_) {
       is_committing_ = true;
       printer_.note("all results are there; the database is being written");
@@ -111,6 +116,7 @@ class JobFollower {
   v1::Job job_;
   std::string waiting_for_;
   core::Stopwatch since_away_;
+  std::string audits_shown_;
   int troubles_shown_ = 0;
   bool has_seen_job_ = false;
   bool is_away_ = false;

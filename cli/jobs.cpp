@@ -31,10 +31,11 @@ struct JobsOptions {
 
 // What people want to know next: the version made, what went wrong, what is lacking.
 std::string remark(const v1::Job& job) {
-  if (job.has_version()) {
-    return reference_text(job.version());
-  }
-  return job.error().empty() ? job.waiting_for() : job.error();
+  std::string text = job.has_version()     ? reference_text(job.version())
+                     : job.error().empty() ? job.waiting_for()
+                                           : job.error();
+  const std::string audits = audits_text(job);
+  return text + (text.empty() || audits.empty() ? "" : "; ") + audits;
 }
 
 void run(const JobsOptions& options) {

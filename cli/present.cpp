@@ -68,6 +68,13 @@ std::string short_digest(const std::string& binary_digest) {
   return hex(binary_digest).substr(0, kShortDigits);
 }
 
+std::string audits_text(const v1::Job& job) {
+  const std::uint64_t count = job.audits_given_up();
+  return count == 0 ? ""
+                    : fmt::format("{} {} not confirmed: no second worker could do it", count,
+                                  count == 1 ? "result was" : "results were");
+}
+
 std::string shards_text(const v1::Job& job) {
   std::uint64_t done = 0;
   std::uint64_t total = 0;

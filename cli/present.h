@@ -28,6 +28,8 @@ using client::reference_text;  // "silk@3"
 [[nodiscard]] std::string short_digest(const std::string& binary_digest);
 
 // Shards done and in all of the stages that are known, "512/1024".
+// That audits were given up, in words; empty when none was.
+[[nodiscard]] std::string audits_text(const v1::Job& job);
 [[nodiscard]] std::string shards_text(const v1::Job& job);
 
 [[nodiscard]] std::vector<StageProgress> stages_of(const v1::Job& job);

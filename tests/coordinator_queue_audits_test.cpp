@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "coordinator/scheduler/messages.h"
 #include "tests/queue_cluster.h"
 #include "tests/queue_invariants.h"
 
@@ -150,6 +151,7 @@ TEST_F(QueueAudits, WithoutASecondName_AuditsAreGivenUpAndCounted) {
   cluster_.advance(5'000);
   EXPECT_EQ(job().phase, JobPhase::kSucceeded);
   EXPECT_EQ(job().audits_given_up, 2U);
+  EXPECT_EQ(message_of(cluster_.queue, job(), cluster_.now).audits_given_up(), 2U);
 }
 
 TEST_F(QueueAudits, AWorkerThatMustEndSoon_IsNoReasonToWait) {

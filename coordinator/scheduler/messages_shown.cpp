@@ -140,6 +140,7 @@ v1::Job message_of(const Queue& queue, const JobState& job, Time now) {
   message.set_superseded_results_used(job.superseded_results_used);
   message.set_speculative_attempts(job.speculative_attempts);
   message.set_audited_shards(job.audited_shards);
+  message.set_audits_given_up(job.audits_given_up);
   for (const StageName name : all_stages()) {
     v1::StageProgress& progress = *message.add_stages();
     progress.set_name(to_string(name));
