@@ -63,6 +63,21 @@ Caller caller_of(const grpc::ServerContextBase& context) {
   }
 }
 
+void check_worker_name(const Caller& caller, std::string_view worker_name) {
+  const std::string& own = caller.user;
+  const bool begins_so = worker_name.starts_with(own);
+  const std::string_view rest = begins_so ? worker_name.substr(own.size()) : worker_name;
+  if (own.empty() || (begins_so && (rest.empty() || rest[0] == '/' || rest[0] == '-'))) {
+    return;
+  }
+  throw core::Error(
+      core::Code::kPermissionDenied,
+      fmt::format("the certificate of '{0}' is for workers named {0}, {0}/... or {0}-..., and not "
+                  "'{1}'. Start the worker with --name {0}, or give its machine a certificate of "
+                  "its own (weft certs issue NAME --role worker)",
+                  own, worker_name));
+}
+
 void check_role(const Caller& caller, std::string_view call) {
   const v1::Role needed = role_needed(call);
   if (!caller.may(needed)) {

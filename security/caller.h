@@ -28,6 +28,10 @@ struct Caller {
 // Throws core::Error(kPermissionDenied) when the certificate is not of weft's making.
 [[nodiscard]] Caller caller_of(const grpc::ServerContextBase& context);
 
+// Throws core::Error(kPermissionDenied) when the caller's certificate is not for a worker of this
+// name: its own name, or that followed by '/' or '-' and whatever else. A local caller may use any.
+void check_worker_name(const Caller& caller, std::string_view worker_name);
+
 // Throws core::Error(kPermissionDenied) when the caller may not make the call, with the role that
 // is needed and those that it has.
 void check_role(const Caller& caller, std::string_view call);

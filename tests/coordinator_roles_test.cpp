@@ -8,6 +8,8 @@
 #include "coordinator/scheduler/scheduler.h"
 #include "coordinator/server.h"
 #include "core/clock.h"
+#include "core/digest.h"
+#include "proto/weft/v1/cluster.grpc.pb.h"
 #include "security/caller.h"
 #include "security/roles.h"
 #include "tests/security_calls.h"
@@ -84,6 +86,65 @@ TEST_F(RolesTest, AForeignAuthoritysCertificateAndNoneDoNotEvenGetAConnection) {
     EXPECT_EQ(security::call(stranger, path).error_code(), grpc::StatusCode::UNAVAILABLE) << path;
     EXPECT_EQ(security::call(nobody, path).error_code(), grpc::StatusCode::UNAVAILABLE) << path;
   }
+}
+
+v1::SynchronizeRequest report_of(const std::string& name, const std::string& id) {
+  v1::SynchronizeRequest request;
+  request.set_request_id("call-1");
+  request.set_worker_id(id);
+  request.set_sequence(1);
+  request.set_name(name);
+  request.set_threads(1);
+  request.set_fingerprint(core::digest_of("a machine").binary());
+  return request;
+}
+
+// As a process of its own each time, where no id is given.
+grpc::Status synchronize(const std::shared_ptr<grpc::Channel>& channel, const std::string& name,
+                         const std::string& id = "") {
+  static int processes = 0;
+  const std::string own = std::string("w").append(std::to_string(++processes));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(30));
+  v1::SynchronizeResponse response;
+  return v1::WorkerService::NewStub(channel)->Synchronize(
+      &context, report_of(name, id.empty() ? own : id), &response);
+}
+
+TEST_F(RolesTest, AWorkerIsCalledAsItsCertificate) {
+  const auto mill = channel(authority_.issue("mill", {v1::ROLE_WORKER}));
+  for (const char* const name : {"mill", "mill/2", "mill-2", "mill/", "mill/a b"}) {
+    const grpc::Status status = synchronize(mill, name);
+    EXPECT_TRUE(status.ok()) << name << ": " << status.error_message();
+  }
+  for (const char* const name : {"mil", "mill2", "Mill", "mill 2", "loom", "loom/mill", ""}) {
+    const grpc::Status status = synchronize(mill, name);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << name;
+    EXPECT_NE(status.error_message().find("mill, mill/... or mill-..."), std::string::npos)
+        << status.error_message();
+  }
+  EXPECT_EQ(scheduler_->workers().size(), 5U);
+  // An admin's certificate, which may do everything, is bound alike.
+  const auto root = channel(authority_.issue("root", {v1::ROLE_ADMIN}));
+  EXPECT_TRUE(synchronize(root, "root/1").ok());
+  EXPECT_EQ(synchronize(root, "mill").error_code(), grpc::StatusCode::PERMISSION_DENIED);
+}
+
+TEST_F(RolesTest, AWorkersIdIsNotToBeHadUnderAnotherName) {
+  const auto loom = channel(authority_.issue("loom", {v1::ROLE_WORKER}));
+  const auto mill = channel(authority_.issue("mill", {v1::ROLE_WORKER}));
+  ASSERT_TRUE(synchronize(loom, "loom", "process").ok());
+  const grpc::Status status = synchronize(mill, "mill", "process");
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION) << status.error_message();
+  ASSERT_EQ(scheduler_->workers().size(), 1U);
+  EXPECT_EQ(scheduler_->workers()[0].name(), "loom");
+}
+
+TEST_F(RolesTest, WithoutTlsAWorkerMayHaveAnyName) {
+  Server local(*scheduler_, "127.0.0.1:0");
+  const auto anybody = security::open_channel(Endpoint(local.address()));
+  EXPECT_TRUE(synchronize(anybody, "loom").ok());
+  EXPECT_TRUE(synchronize(anybody, "mill/2").ok());
 }
 
 TEST_F(RolesTest, HealthAndReflectionAnswerWhoeverHasARole) {

@@ -82,11 +82,12 @@ void Scheduler::synchronize(ReportEvent report, std::uint64_t sequence,
   check_running();
   const std::string worker = report.worker;
   const auto known = queue_.workers().find(worker);
-  if (known != queue_.workers().end() && known->second.fingerprint != report.fingerprint) {
+  if (known != queue_.workers().end() &&
+      (known->second.fingerprint != report.fingerprint || known->second.name != report.name)) {
     throw core::Error(core::Code::kFailedPrecondition,
                       "worker " + worker +
-                          " is known with another numerics fingerprint; start it again, under a "
-                          "new worker_id");
+                          " is known with another name or numerics fingerprint; start it again, "
+                          "under a new worker_id");
   }
   std::uint64_t& newest = sequences_[worker];
   if (sequence <= newest) {

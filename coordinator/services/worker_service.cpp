@@ -35,8 +35,9 @@ class Exchange final : public grpc::ServerUnaryReactor {
 
   void start(const grpc::CallbackServerContext& context, const v1::SynchronizeRequest& request) {
     const grpc::Status status = status_of("WorkerService.Synchronize", [&] {
-      (void)security::check_role(context, "WorkerService.Synchronize");
+      const security::Caller caller = security::check_role(context, "WorkerService.Synchronize");
       ReportEvent report = report_from(request);
+      security::check_worker_name(caller, report.name);
       keep_verified(scheduler_.blobs(), report);
       scheduler_.synchronize(
           std::move(report), sequence_, std::chrono::milliseconds(request.wait_ms()),

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "core/cache_folder.h"
+#include "core/clock.h"
 #include "core/interrupt.h"
 #include "core/program.h"
 #include "proto/address.h"
@@ -19,6 +20,7 @@
 #include "security/channel.h"
 #include "security/endpoint_options.h"
 #include "security/grpc_setup.h"
+#include "security/tls_folder.h"
 #include "security/tls_probe.h"
 #include "worker/lease_loop.h"
 
@@ -34,6 +36,17 @@ std::string host_name() {
   }
   name.resize(name.find('\0'));
   return name;
+}
+
+// A machine's certificate is for workers of its name.
+std::string default_name(const weft::security::Endpoint& coordinator) {
+  if (coordinator.tls_folder.empty()) {
+    return host_name().substr(0, weft::v1::kNameLimitBytes);
+  }
+  const weft::security::TlsFolder folder{coordinator.tls_folder};
+  return weft::security::check_tls_folder(folder, weft::security::TlsUse::kCall,
+                                          weft::core::system_clock().now())
+      .name;
 }
 
 std::string default_scratch() {
@@ -56,7 +69,6 @@ struct Flags {
 };
 
 void declare(CLI::App& app, Flags& flags) {
-  flags.worker.name = host_name().substr(0, weft::v1::kNameLimitBytes);
   flags.worker.threads = std::max(1U, std::thread::hardware_concurrency());
   flags.worker.scratch = default_scratch();
   flags.worker.memory_bytes = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
@@ -66,13 +78,15 @@ void declare(CLI::App& app, Flags& flags) {
       ->check(CLI::Validator(weft::v1::mistake_in_address, "", "address"))
       ->capture_default_str();
   weft::security::add_security_options(app, flags.coordinator);
-  app.add_option("--name", flags.worker.name, "Name for people, at most 128 characters")
+  app.add_option("--name", flags.worker.name,
+                 "Name for people, at most 128 characters. With --tls-folder the certificate's "
+                 "name, or one that begins with it and / or -. Default: the certificate's name, "
+                 "else the machine's")
       ->check([](const std::string& name) {
         return weft::v1::is_worker_name(name)
                    ? std::string()
                    : "the name must have 1 to 128 characters, none of them a control character";
-      })
-      ->capture_default_str();
+      });
   app.add_option("--threads", flags.worker.threads, "Shards computed at the same time")
       ->check(CLI::Range(1U, weft::v1::kThreadsLimit))
       ->capture_default_str();
@@ -118,6 +132,9 @@ void work(Flags flags) {
   // A limit of file sizes (ulimit -f) is a full disk to us, which is said and waited for.
   std::signal(SIGXFSZ, SIG_IGN);
   flags.worker.coordinator = flags.coordinator.address;
+  if (flags.worker.name.empty()) {
+    flags.worker.name = default_name(flags.coordinator);
+  }
   flags.worker.connection_problem = [endpoint = flags.coordinator] {
     return weft::security::tls_problem(endpoint);
   };
