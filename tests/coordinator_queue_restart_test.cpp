@@ -99,5 +99,49 @@ TEST_F(QueueSecondStage, AnAttemptOfAJobThatWasBoundToOtherNumbers_IsNotGivenAga
   EXPECT_EQ(job().stages[1].running, 0U);
 }
 
+TEST(QueueRestart, AnAttemptThatHangsOnAfterARestart_IsTakenAwayForGood) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 1);
+  cluster.submit("a", {1});
+  worker.sync(1);
+  ASSERT_EQ(worker.held.size(), 1U);
+  const std::uint64_t attempt = worker.held[0].attempt;
+  cluster.restart();
+  for (int i = 0; i < 200 && !cluster.outcomes.contains(attempt); ++i) {
+    EXPECT_EQ(worker.send(0).leases.size(), 1U);  // it lives, and gets nowhere
+    cluster.advance(5'000);
+  }
+  ASSERT_EQ(cluster.outcomes.at(attempt), Outcome::kHung);
+  const Reply reply = worker.send(0);
+  EXPECT_TRUE(reply.leases.empty()) << "it was given the attempt back";
+  EXPECT_EQ(reply.stop.size(), 1U);
+  EXPECT_EQ(cluster.job("a").stages[0].running, 0U);
+  EXPECT_EQ(cluster.job("a").stages[0].failures, 1U);
+}
+
+TEST(QueueRestart, AJobWasSubmittedWhenItWas) {
+  QueueCluster cluster;
+  cluster.submit("a", {1});
+  const Time submitted_at = cluster.job("a").submitted_at;
+  cluster.advance(60'000);
+  cluster.restart();
+  EXPECT_EQ(cluster.job("a").submitted_at, submitted_at);
+}
+
+TEST(QueueRestart, AJobThatHasResults_IsRunningBeforeAnyWorkerIsThere) {
+  QueueCluster cluster;
+  QueueWorker worker(cluster, "w", 1);
+  cluster.submit("a", {3});
+  worker.sync(1);
+  ASSERT_LT(worker.held.at(0).shards, 3U);
+  worker.finish();
+  worker.sync();
+  ASSERT_TRUE(cluster.open_attempts.empty());
+  cluster.restart();
+  EXPECT_EQ(cluster.job("a").stages.at(0).cached, cluster.job("a").stages[0].done);
+  EXPECT_GT(cluster.job("a").stages[0].done, 0U);
+  EXPECT_EQ(cluster.job("a").phase, JobPhase::kRunning);
+}
+
 }  // namespace
 }  // namespace weft::coordinator

@@ -112,6 +112,13 @@ class AnyCall : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffe
     return answers_ > 0;
   }
 
+  // Returns when the last message is this one, or the call ended: whether it is.
+  [[nodiscard]] bool wait_for_answer(const std::string& bytes) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return is_done_ || answer_ == bytes; });
+    return answer_ == bytes;
+  }
+
   // The bytes of the message that came last.
   [[nodiscard]] std::string answer() {
     const std::lock_guard lock(mutex_);
