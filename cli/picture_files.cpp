@@ -139,6 +139,7 @@ void PictureFiles::finish(const render::Frame& frame, const render::Picture& pic
   written.cloth_mean = picture.drawing.cloth_mean;
   written.cloth_standard_error = picture.drawing.cloth_standard_error;
   written.cloth_share = picture.drawing.cloth_share;
+  written.mean_samples = picture.drawing.mean_samples;
   written.load_seconds = picture.load_seconds;
   written.draw_seconds = picture.draw_seconds;
   written.device = picture.device;

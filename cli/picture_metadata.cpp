@@ -64,7 +64,8 @@ std::map<std::string, std::string> recipe_of(const v1::Scene& still,
 std::map<std::string, std::string> figures_of(const render::Drawing& drawing) {
   return {{"weft.cloth_mean", triple(drawing.cloth_mean).dump()},
           {"weft.cloth_standard_error", triple(drawing.cloth_standard_error).dump()},
-          {"weft.cloth_share", nlohmann::json(drawing.cloth_share).dump()}};
+          {"weft.cloth_share", nlohmann::json(drawing.cloth_share).dump()},
+          {"weft.mean_samples", nlohmann::json(drawing.mean_samples).dump()}};
 }
 
 bool is_drawn_from(const std::string& path, const std::map<std::string, std::string>& recipe) {

@@ -87,6 +87,9 @@ v1::Scene described_scene(RenderOptions& options) {
   if (options.max_scatterings) {
     integration.set_max_scatterings(*options.max_scatterings);
   }
+  if (options.target_error) {
+    integration.set_target_error(*options.target_error);
+  }
   if (!options.integrator.empty()) {
     integration.set_integrator(render::integrators_by_name().at(options.integrator));
   }
@@ -165,6 +168,11 @@ void add_drawing_options(CLI::App& command, RenderOptions& options) {
                   "Spherical Gaussians fitted to an environment; 0: draw directions from it")
       ->check(CLI::Range(0U, render::kMostFittedLights));
   command.add_option("--spp", options.samples, "Samples per pixel")->check(CLI::Range(1, 1 << 20));
+  command
+      .add_option("--target-error", options.target_error,
+                  "Fewer samples where a pixel's standard error would be below this share of its\n"
+                  "brightness, such as 0.02; --spp is the most (CPU)")
+      ->check(CLI::Range(0.0, 10.0));
   command.add_option("--size", options.size, "WIDTHxHEIGHT in pixels");
   command.add_flag("--paper", options.paper,
                    "Precomputed integrator: shade Gaussian lights by the paper's choices");

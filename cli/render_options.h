@@ -28,6 +28,7 @@ struct RenderOptions {
   std::optional<std::uint64_t> seed;
   std::optional<std::uint32_t> max_scatterings;
   std::optional<std::uint32_t> environment_lights;
+  std::optional<double> target_error;
   std::optional<float> exposure;
   std::string single_from;
   std::string multiple_from;

@@ -18,6 +18,7 @@ nlohmann::json json_of(const WrittenPicture& picture, const std::string& integra
           {"width", picture.width},
           {"height", picture.height},
           {"samples_per_pixel", picture.samples_per_pixel},
+          {"mean_samples", picture.mean_samples},
           {"integrator", integrator},
           {"cloth_mean", triple(picture.cloth_mean)},
           {"cloth_standard_error", triple(picture.cloth_standard_error)},
@@ -40,9 +41,11 @@ void print_frames(const std::vector<WrittenPicture>& pictures) {
 }
 
 void print_picture(const WrittenPicture& picture) {
-  fmt::print("{}{}: {} x {}, {} samples a pixel\n", picture.out,
+  const bool is_adaptive = !picture.was_there && picture.mean_samples < picture.samples_per_pixel;
+  fmt::print("{}{}: {} x {}, {} samples a pixel{}\n", picture.out,
              picture.png.empty() ? "" : " and " + picture.png, picture.width, picture.height,
-             picture.samples_per_pixel);
+             picture.samples_per_pixel,
+             is_adaptive ? fmt::format(" at most, {:.1f} in the mean", picture.mean_samples) : "");
   if (picture.was_there) {
     fmt::print("was there\n");
     return;

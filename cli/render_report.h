@@ -21,6 +21,7 @@ struct WrittenPicture {
   glm::dvec3 cloth_mean{0, 0, 0};
   glm::dvec3 cloth_standard_error{0, 0, 0};
   double cloth_share = 0;
+  double mean_samples = 0;  // of a pixel
   double load_seconds = 0;
   double draw_seconds = 0;
   std::string device;  // that drew it

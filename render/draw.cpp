@@ -1,6 +1,6 @@
 #include "render/draw.h"
 
-#include <array>
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <vector>
@@ -13,6 +13,7 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/random.h"
+#include "render/adaptive.h"
 #include "render/pixel_sums.h"
 
 namespace weft::render {
@@ -30,23 +31,18 @@ void add_to_layers(LayerSums& sums, const EyeSample& seen, std::uint32_t sample)
   }
 }
 
-// Which samples of a pixel are drawn.
-struct SampleRange {
-  std::uint32_t first = 0;
-  std::uint32_t count = 0;
-};
-
-// `layers` may be null.
+// Up to sample `end`. `layers` may be null.
 void draw_pixel(const Camera& camera, const Integrator& integrator, const DrawSettings& settings,
-                glm::uvec2 pixel, SampleRange range, PixelSums& sums, LayerSums* layers) {
+                glm::uvec2 pixel, std::uint32_t end, PixelSums& sums, LayerSums* layers) {
   const std::uint64_t seed = core::derive_seed(settings.seed, kPurposeOfEyeRays);
-  for (std::uint32_t sample = range.first; sample < range.first + range.count; ++sample) {
+  for (std::uint32_t sample = sums.samples; sample < end; ++sample) {
     core::Random random(seed, pixel.y * settings.width + pixel.x, sample);
     const double dx = random.uniform_double();
     const double dy = random.uniform_double();
     const EyeSample seen = integrator.trace(
         camera.ray({(pixel.x + dx) / settings.width, (pixel.y + dy) / settings.height}), random);
     const glm::dvec3 radiance(seen.radiance);
+    ++sums.samples;
     sums.radiance += radiance;
     sums.squared += radiance * radiance;
     if (seen.on_cloth) {
@@ -64,7 +60,8 @@ void draw_pixel(const Camera& camera, const Integrator& integrator, const DrawSe
 
 struct GrowingDrawing::Sums {
   std::vector<PixelSums> pixels;
-  std::vector<LayerSums> layers;  // empty when no layer is wanted
+  std::vector<LayerSums> layers;       // empty when no layer is wanted
+  std::vector<std::uint32_t> planned;  // samples in all; empty: of every pixel as many
 };
 
 GrowingDrawing::GrowingDrawing(const DrawSettings& settings)
@@ -88,9 +85,37 @@ std::uint64_t GrowingDrawing::size_bytes(const DrawSettings& settings) {
                    (settings.layers.empty() ? 0 : sizeof(LayerSums) + kLayerPlanes));
 }
 
+void GrowingDrawing::plan_if_due() {
+  if (settings_.target_error > 0 && samples_ == kPilotSamples &&
+      settings_.samples_per_pixel > kPilotSamples) {
+    sums_->planned = samples_by_pixel(
+        sums_->pixels,
+        {settings_.width, settings_.height, settings_.samples_per_pixel, settings_.target_error});
+  }
+}
+
 void GrowingDrawing::add_samples(const Camera& camera, const Integrator& integrator,
                                  std::uint32_t count, const std::function<void(double)>& progress,
                                  const std::function<bool()>& should_stop) {
+  const std::uint32_t end = samples_ + count;
+  const bool has_pilot =
+      settings_.target_error > 0 && samples_ < kPilotSamples && end > kPilotSamples;
+  const double pilot = has_pilot ? static_cast<double>(kPilotSamples - samples_) / count : 0;
+  if (has_pilot) {
+    add_range(
+        camera, integrator, kPilotSamples, [&](double share) { progress(share * pilot); },
+        should_stop);
+    plan_if_due();
+  }
+  add_range(
+      camera, integrator, end, [&](double share) { progress(pilot + share * (1 - pilot)); },
+      should_stop);
+  plan_if_due();
+}
+
+void GrowingDrawing::add_range(const Camera& camera, const Integrator& integrator,
+                               std::uint32_t end, const std::function<void(double)>& progress,
+                               const std::function<bool()>& should_stop) {
   std::atomic<bool> stopped = false;
   std::mutex progress_mutex;
   std::uint32_t rows_done = 0;  // under progress_mutex
@@ -101,7 +126,8 @@ void GrowingDrawing::add_samples(const Camera& camera, const Integrator& integra
         return;
       }
       const std::size_t i = static_cast<std::size_t>(y) * settings_.width + x;
-      draw_pixel(camera, integrator, settings_, {x, y}, {samples_, count}, sums_->pixels[i],
+      const std::uint32_t own_end = sums_->planned.empty() ? end : std::min(end, sums_->planned[i]);
+      draw_pixel(camera, integrator, settings_, {x, y}, own_end, sums_->pixels[i],
                  sums_->layers.empty() ? nullptr : &sums_->layers[i]);
     }
     const std::lock_guard lock(progress_mutex);
@@ -123,11 +149,11 @@ void GrowingDrawing::add_samples(const Camera& camera, const Integrator& integra
   if (stopped) {
     throw core::Error(core::Code::kCancelled, "the picture was cancelled; nothing was written");
   }
-  samples_ += count;
+  samples_ = end;
 }
 
 Drawing GrowingDrawing::drawing() const {
-  return drawing_of(settings_, sums_->pixels, sums_->layers, samples_);
+  return drawing_of(settings_, sums_->pixels, sums_->layers);
 }
 
 Drawing draw(const Camera& camera, const Integrator& integrator, const DrawSettings& settings,

@@ -20,6 +20,8 @@ struct DrawSettings {
   std::uint32_t width = 512;
   std::uint32_t height = 512;
   std::uint32_t samples_per_pixel = 64;
+  // Above 0: pixels get fewer samples where fewer are enough (render/adaptive.h).
+  double target_error = 0;
   std::uint64_t seed = 1;
   unsigned threads = 0;  // 0: as many as the machine has
   LayerSet layers;       // wanted besides the colour
@@ -34,6 +36,7 @@ struct Drawing {
   glm::dvec3 cloth_mean{0, 0, 0};
   glm::dvec3 cloth_standard_error{0, 0, 0};
   double cloth_share = 0;
+  double mean_samples = 0;  // of a pixel
 };
 
 // Draws the picture. The random numbers of a sample depend on nothing but (seed, pixel, sample):
@@ -57,8 +60,8 @@ class GrowingDrawing {
   GrowingDrawing(GrowingDrawing&&) = delete;
   GrowingDrawing& operator=(GrowingDrawing&&) = delete;
 
-  // Adds `count` samples to every pixel; `progress` and `should_stop` as for draw(). After an
-  // exception the sums are of no use: take drawing() before.
+  // Adds `count` samples to every pixel, or those of them that it needs; `progress` and
+  // `should_stop` as for draw(). After an exception the sums are of no use: take drawing() before.
   void add_samples(const Camera& camera, const Integrator& integrator, std::uint32_t count,
                    const std::function<void(double)>& progress,
                    const std::function<bool()>& should_stop);
@@ -72,6 +75,12 @@ class GrowingDrawing {
 
  private:
   struct Sums;
+  // Up to sample `end` of every pixel that needs so many.
+  void add_range(const Camera& camera, const Integrator& integrator, std::uint32_t end,
+                 const std::function<void(double)>& progress,
+                 const std::function<bool()>& should_stop);
+  void plan_if_due();
+
   DrawSettings settings_;
   std::unique_ptr<Sums> sums_;
   std::uint32_t samples_ = 0;

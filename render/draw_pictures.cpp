@@ -178,6 +178,7 @@ DrawSettings draw_settings(const v1::Scene& scene, unsigned threads) {
   settings.width = scene.picture().width();
   settings.height = scene.picture().height();
   settings.samples_per_pixel = scene.picture().samples_per_pixel();
+  settings.target_error = scene.integration().target_error();
   settings.seed = scene.integration().seed();
   settings.threads = threads;
   settings.layers = layers_of(scene.picture());

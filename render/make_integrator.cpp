@@ -62,6 +62,7 @@ std::unique_ptr<Integrator> make_integrator(const v1::Integration& integration, 
 
 bool draws_on_device(const v1::Integration& integration) {
   return integration.integrator() == v1::INTEGRATOR_PRECOMPUTED &&
+         integration.target_error() == 0 &&
          source_of(integration.single_from()) == TermSource::kDatabase &&
          source_of(integration.multiple_from()) == TermSource::kDatabase;
 }

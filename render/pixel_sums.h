@@ -17,6 +17,7 @@ struct PixelSums {
   glm::dvec3 cloth_radiance{0, 0, 0};
   glm::dvec3 cloth_squared{0, 0, 0};
   std::uint32_t on_cloth = 0;
+  std::uint32_t samples = 0;
 };
 
 // Sums over the samples of one pixel for its layers, and what its first sample saw.
@@ -30,9 +31,9 @@ struct LayerSums {
   glm::vec3 normal{0, 0, 0};
 };
 
-// The drawing that the sums over `samples` samples of every pixel make: those of [height, width]
-// pixels, and of their layers where any is wanted. REQUIRES: samples > 0.
+// The drawing that the sums over the samples of [height, width] pixels make, and those of their
+// layers where any is wanted. REQUIRES: each pixel has a sample.
 [[nodiscard]] Drawing drawing_of(const DrawSettings& settings, const std::vector<PixelSums>& pixels,
-                                 const std::vector<LayerSums>& layers, std::uint32_t samples);
+                                 const std::vector<LayerSums>& layers);
 
 }  // namespace weft::render

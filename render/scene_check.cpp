@@ -43,6 +43,8 @@ class Checker {
     require(scene_.integration().environment_lights() <= kMostFittedLights,
             "integration.environment_lights",
             "too many; give at most " + std::to_string(kMostFittedLights));
+    require(scene_.integration().target_error() >= 0, "integration.target_error",
+            "negative; give a share of the brightness, such as 0.02, or 0 for none");
     if (scene_.has_animation()) {
       check_keys(scene_.animation());
     }

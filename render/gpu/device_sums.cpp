@@ -26,12 +26,13 @@ struct RotationAt {
 }  // namespace
 
 std::vector<PixelSums> pixel_sums(const std::vector<DevicePixel>& pixels,
-                                  const glm::vec3& background) {
+                                  const glm::vec3& background, std::uint32_t samples) {
   const glm::dvec3 behind(background);
   std::vector<PixelSums> sums;
   sums.reserve(pixels.size());
   for (const DevicePixel& pixel : pixels) {
     PixelSums of;
+    of.samples = samples;
     of.cloth_radiance =
         sum_of(pixel.single, pixel.single_rest) + sum_of(pixel.multiple, pixel.multiple_rest);
     of.cloth_squared = sum_of(pixel.squared, pixel.squared_rest);

@@ -289,7 +289,7 @@ Drawing DeviceDrawing::drawing() const {
   if (!settings_.picture.layers.empty()) {
     layers = layer_sums(pixels_, scene_, fabrics_);
   }
-  return drawing_of(settings_.picture, pixel_sums(pixels_, scene_.background), layers, samples_);
+  return drawing_of(settings_.picture, pixel_sums(pixels_, scene_.background, samples_), layers);
 }
 
 Drawing draw_on_device(DeviceRenderer& renderer, const Scene& scene,

@@ -93,6 +93,7 @@ v1::PictureHeader header_of(const Picture& picture, bool finished) {
     header.add_cloth_standard_error(drawing.cloth_standard_error[c]);
   }
   header.set_cloth_share(drawing.cloth_share);
+  header.set_mean_samples(drawing.mean_samples);
   header.set_load_seconds(picture.load_seconds);
   header.set_draw_seconds(picture.draw_seconds);
   header.set_device(picture.device);
@@ -158,6 +159,7 @@ Picture PictureReceiver::picture() const {
   drawing.cloth_mean = triple(header_.cloth_mean());
   drawing.cloth_standard_error = triple(header_.cloth_standard_error());
   drawing.cloth_share = header_.cloth_share();
+  drawing.mean_samples = header_.mean_samples();
   picture.samples_per_pixel = header_.samples_per_pixel();
   picture.load_seconds = header_.load_seconds();
   picture.draw_seconds = header_.draw_seconds();
