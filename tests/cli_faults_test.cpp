@@ -258,9 +258,13 @@ TEST_F(Faults, ACoordinatorWithAFullDiskStopsAndGoesOnWhenThereIsRoom) {
   FaultCluster cluster(folder_.path() / "full-journal", 2, "9");
   cluster.start_worker(0);
   cluster.start_worker(1);
-  cluster.submit(folder_, description_);
+  const std::string id = cluster.submit(folder_, description_);
   ASSERT_EQ(cluster.wait_for_transfer().ended_at_ms(), 0);
   limit_files(cluster.coordinator(), 1000);
+  // Workers keep what it cannot store and report nothing more; an order is written to the journal.
+  const Finished order =
+      run_weft(folder_, {"priority", id, "1", "--coordinator", cluster.address()});
+  EXPECT_EQ(order.code, 5) << order.out << order.err;
   const auto code = cluster.coordinator().wait(60);
   ASSERT_TRUE(code) << "it goes on though its journal cannot be written";
   EXPECT_EQ(*code, 1);

@@ -256,7 +256,7 @@ TEST_F(QueueAudits, ALiarThatWasFound_IsToldAfterARestart) {
 }
 
 // Found by a seed of tests/simulation.
-TEST(QueueRestart, AnAuditOfTwoDisputedShards_LeavesTheSecondToOthersWhenTheJobBeginsAgain) {
+TEST(QueueDisputedAudits, AnAuditOfTwoDisputedShards_LeavesTheSecondToOthersWhenTheJobBeginsAgain) {
   QueueCluster cluster;
   QueueWorker late(cluster, "late", 2);
   cluster.submit_audited("a", {2, 1}, 1);

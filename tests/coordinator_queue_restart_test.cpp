@@ -99,7 +99,7 @@ TEST_F(QueueSecondStage, AnAttemptOfAJobThatWasBoundToOtherNumbers_IsNotGivenAga
   EXPECT_EQ(job().stages[1].running, 0U);
 }
 
-TEST(QueueRestart, AnAttemptThatHangsOnAfterARestart_IsTakenAwayForGood) {
+TEST(QueueAfterARestart, AnAttemptThatHangsOnAfterARestart_IsTakenAwayForGood) {
   QueueCluster cluster;
   QueueWorker worker(cluster, "w", 1);
   cluster.submit("a", {1});
@@ -119,7 +119,7 @@ TEST(QueueRestart, AnAttemptThatHangsOnAfterARestart_IsTakenAwayForGood) {
   EXPECT_EQ(cluster.job("a").stages[0].failures, 1U);
 }
 
-TEST(QueueRestart, AJobWasSubmittedWhenItWas) {
+TEST(QueueAfterARestart, AJobWasSubmittedWhenItWas) {
   QueueCluster cluster;
   cluster.submit("a", {1});
   const Time submitted_at = cluster.job("a").submitted_at;
@@ -128,7 +128,7 @@ TEST(QueueRestart, AJobWasSubmittedWhenItWas) {
   EXPECT_EQ(cluster.job("a").submitted_at, submitted_at);
 }
 
-TEST(QueueRestart, AJobThatHasResults_IsRunningBeforeAnyWorkerIsThere) {
+TEST(QueueAfterARestart, AJobThatHasResults_IsRunningBeforeAnyWorkerIsThere) {
   QueueCluster cluster;
   QueueWorker worker(cluster, "w", 1);
   cluster.submit("a", {3});
