@@ -19,7 +19,9 @@ Coordinator::Coordinator(security::Endpoint endpoint)
 }
 
 bool Coordinator::is_worth_repeating(const grpc::Status& status) {
+  // A server that stops cancels the calls that it is answering.
   return status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+         status.error_code() == grpc::StatusCode::CANCELLED ||
          status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
 }
 

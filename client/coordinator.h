@@ -65,10 +65,12 @@ class Coordinator {
 
   static void set_deadline(grpc::ClientContext& context, std::chrono::seconds from_now);
 
+  // Whether the call may succeed when it is made again.
+  [[nodiscard]] static bool is_worth_repeating(const grpc::Status& status);
+
  private:
   static constexpr int kTries = 3;
   static constexpr std::chrono::milliseconds kBetweenTries{300};
-  [[nodiscard]] static bool is_worth_repeating(const grpc::Status& status);
 
   security::Endpoint endpoint_;
   std::shared_ptr<grpc::Channel> channel_;  // shared: gRPC's stubs ask for it

@@ -99,9 +99,7 @@ void set_deadline(grpc::ClientContext& context, std::uint64_t bytes) {
 }
 
 void Patience::wait(const grpc::Status& status, bool has_progressed) {
-  const bool is_worth_repeating = status.ok() ||
-                                  status.error_code() == grpc::StatusCode::UNAVAILABLE ||
-                                  status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+  const bool is_worth_repeating = status.ok() || Coordinator::is_worth_repeating(status);
   if (has_progressed || wait_ == std::chrono::milliseconds(0)) {
     tries_left_ = kTriesWithoutProgress;
     wait_ = kFirstWait;
