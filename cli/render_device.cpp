@@ -12,10 +12,12 @@ std::unique_ptr<render::gpu::DeviceRenderer> open_render_device(const std::strin
   }
   if (!render::draws_on_device(scene.integration())) {
     if (wanted != "auto") {
-      throw core::Error(core::Code::kInvalidArgument,
-                        "--device " + wanted +
-                            ": devices draw the precomputed integrator from its database alone; "
-                            "leave --device away, or write --device cpu");
+      throw core::Error(
+          core::Code::kInvalidArgument,
+          "--device " + wanted +
+              ": devices draw the precomputed integrator alone, from its database and with "
+              "as many samples for each pixel; "
+              "leave --device away, or write --device cpu");
     }
     return nullptr;
   }
