@@ -3,11 +3,9 @@
 #include <functional>
 #include <string>
 
-#include "core/exit_code.h"
+#include <CLI/CLI.hpp>
 
-namespace CLI {
-class App;
-}
+#include "core/exit_code.h"
 
 namespace weft::core {
 

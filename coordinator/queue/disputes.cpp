@@ -69,6 +69,27 @@ void name_liar(Trouble& trouble, const std::string& liar) {
                     " gave a wrong result; others agree on another one";
 }
 
+std::vector<std::uint64_t> done_shards(const StageState& stage, StageName name,
+                                       const core::Digest& work) {
+  std::vector<std::uint64_t> shards;
+  for (std::uint64_t i = 0; stage.name == name && i < stage.shards.size(); ++i) {
+    if (stage.digests[i] == work && stage.shards[i] == ShardState::kDone) {
+      shards.push_back(i);
+    }
+  }
+  return shards;
+}
+
+std::vector<std::uint64_t> disputed_shards(const StageState& stage, const core::Digest& work) {
+  std::vector<std::uint64_t> shards;
+  for (const std::uint64_t shard : stage.disputed) {
+    if (stage.digests[shard] == work) {
+      shards.push_back(shard);
+    }
+  }
+  return shards;
+}
+
 }  // namespace
 
 bool Dispute::has_asked(const std::string& worker) const {
@@ -101,11 +122,9 @@ bool Queue::open_dispute(const core::Digest& work, Dispute dispute, Time now, Ac
       continue;
     }
     for (StageState& stage : job.stages) {
-      for (std::uint64_t i = 0; stage.name == dispute.stage && i < stage.shards.size(); ++i) {
-        if (stage.digests[i] == work && stage.shards[i] == ShardState::kDone) {
-          dispute.jobs.insert(order);
-          join_dispute(job, stage, i, dispute, actions);
-        }
+      for (const std::uint64_t shard : done_shards(stage, dispute.stage, work)) {
+        dispute.jobs.insert(order);
+        join_dispute(job, stage, shard, dispute, actions);
       }
     }
     refresh(job, now);
@@ -261,22 +280,20 @@ bool Queue::is_disputed(std::uint64_t order, const Trouble& trouble,
 void Queue::replace(const core::Digest& work, const Dispute& dispute, const Dispute::Opinion& right,
                     Time now, Actions& actions) {
   const bool was_wrong = dispute.opinions.front().result != right.result;
+  // Whether others may have computed from the wrong one.
+  const auto take_right = [&](StageState& stage, std::uint64_t shard) {
+    stage.results[shard] = right.result;
+    stage.authors[shard] = author_of(right.worker);
+    return stage.is_done();
+  };
   for (const std::uint64_t order : dispute.jobs) {
     JobState& job = jobs_.at(order);
     bool was_used = false;
     for (StageState& stage : job.stages) {
-      const std::set<std::uint64_t> disputed = stage.disputed;
-      for (const std::uint64_t shard : disputed) {
-        if (stage.digests[shard] != work) {
-          continue;
-        }
+      for (const std::uint64_t shard : disputed_shards(stage, work)) {
         stage.disputed.erase(shard);
         ++job.audited_shards;
-        if (was_wrong) {
-          stage.results[shard] = right.result;
-          stage.authors[shard] = author_of(right.worker);
-          was_used = was_used || stage.is_done();
-        }
+        was_used = (was_wrong && take_right(stage, shard)) || was_used;
       }
     }
     ++job.revision;
