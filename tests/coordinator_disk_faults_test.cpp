@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include "core/error.h"
 #include "tests/coordinator_service_fixture.h"
@@ -26,14 +25,8 @@ class DiskFaults : public testing::Test {
  protected:
   void SetUp() override {
     spdlog::set_level(spdlog::level::off);
-    // What is synced is told by FaultyDisk, so that a folder in memory serves as well.
-    const std::filesystem::path memory = "/dev/shm";
-    const bool has_memory = ::access(memory.c_str(), W_OK) == 0;
-    const std::filesystem::path place =
-        has_memory ? memory : std::filesystem::temp_directory_path();
-    std::string name = (place / "weft_disk_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
+    folder_ = make_fault_folder("disk");
+    ASSERT_FALSE(folder_.empty());
     state_ = folder_ / "base";
     open();
     publish(small_description(), "first");

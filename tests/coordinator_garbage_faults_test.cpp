@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include "coordinator/journal/sqlite.h"
 #include "coordinator/scheduler/garbage.h"
@@ -33,13 +32,8 @@ class GarbageFaults : public testing::Test {
  protected:
   void SetUp() override {
     spdlog::set_level(spdlog::level::off);
-    const std::filesystem::path memory = "/dev/shm";
-    const bool has_memory = ::access(memory.c_str(), W_OK) == 0;
-    std::string name =
-        ((has_memory ? memory : std::filesystem::temp_directory_path()) / "weft_gc_XXXXXX")
-            .string();
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
+    folder_ = make_fault_folder("gc");
+    ASSERT_FALSE(folder_.empty());
     state_ = folder_ / "base";
     make_base();
     begin("reference");

@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -16,10 +17,21 @@
 #include <vector>
 
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include "core/file_fault.h"
 
 namespace weft::coordinator {
+
+// A new folder, "weft_NAME_" and more, in memory where the machine has a place for it: what is
+// synced is told by FaultyDisk. Empty when it cannot be made.
+inline std::filesystem::path make_fault_folder(const std::string& name) {
+  const std::filesystem::path memory = "/dev/shm";
+  const bool has_memory = ::access(memory.c_str(), W_OK) == 0;
+  const std::filesystem::path place = has_memory ? memory : std::filesystem::temp_directory_path();
+  std::string path = (place / ("weft_" + name + "_XXXXXX")).string();
+  return ::mkdtemp(path.data()) != nullptr ? path : std::string();
+}
 
 // A disk on which one operation goes wrong: under SQLite it is a VFS of its own, the default while
 // this lives; under core/file it is the fault hook. Writes, syncs, renames, removals and openings
