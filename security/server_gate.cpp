@@ -2,13 +2,11 @@
 
 #include <chrono>
 #include <condition_variable>
-#include <filesystem>
 #include <list>
 #include <mutex>
 #include <optional>
 #include <string_view>
 #include <thread>
-#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -25,10 +23,10 @@
 
 #include "core/clock.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "proto/address.h"
 #include "proto/limits.h"
 #include "proto/status.h"
+#include "security/admission.h"
 #include "security/caller.h"
 #include "security/roles.h"
 #include "security/tls_folder.h"
@@ -40,31 +38,9 @@ namespace {
 
 constexpr unsigned kRefreshSeconds = 2;
 constexpr auto kBetweenLooks = std::chrono::seconds(1);
-constexpr std::size_t kCertificatesLimit = 1024;  // read ones that are remembered
-constexpr std::uint64_t kListLimitBytes = 16 << 20;
 // Connections are begun anew after this time, so that a caller's new certificate is used before the
 // old one expires. Calls under way stay on the old connection until they end.
 constexpr int kConnectionAgeMs = 300'000;
-
-using Certificates = std::unordered_map<std::string, Certificate>;
-
-// What changes when a file is written anew.
-struct FileState {
-  std::filesystem::file_time_type time{};
-  std::uintmax_t size = 0;
-  bool is_there = false;
-
-  friend bool operator==(const FileState&, const FileState&) = default;
-};
-
-FileState state_of(const std::filesystem::path& path) {
-  std::error_code failure;
-  FileState state;
-  state.time = std::filesystem::last_write_time(path, failure);
-  state.is_there = !failure;
-  state.size = state.is_there ? std::filesystem::file_size(path, failure) : 0;
-  return state.is_there ? state : FileState{};
-}
 
 // "/weft.v1.JobService/Submit" is JobService.Submit; empty when it is no call of weft.
 std::string call_of(std::string_view path) {
@@ -103,8 +79,7 @@ std::string pem_of(const grpc::AuthContext& peer) {
 // Knows who may call now. Any thread.
 class ServerGate::Guard {
  public:
-  explicit Guard(TlsFolder folder) : folder_(std::move(folder)) {
-    load_list();
+  explicit Guard(TlsFolder folder) : admission_(std::move(folder)) {
     thread_ = std::thread([this] { look_now_and_then(); });
   }
   ~Guard() {
@@ -121,19 +96,11 @@ class ServerGate::Guard {
   Guard& operator=(Guard&&) = delete;
 
   [[nodiscard]] grpc::Status admit(const std::string& pem, std::string_view path) {
-    Caller caller;
-    {
-      const std::lock_guard lock(mutex_);
-      const Certificate* certificate = find(pem);
-      if (certificate == nullptr) {
-        return {grpc::StatusCode::UNAUTHENTICATED,
-                "the call comes without a certificate that can be read"};
-      }
-      if (const std::string problem = problem_of(*certificate); !problem.empty()) {
-        return {grpc::StatusCode::UNAUTHENTICATED, problem};
-      }
-      caller = {certificate->name, certificate->roles};
+    const Admission::Verdict verdict = admission_.judge(pem);
+    if (!verdict.problem.empty()) {
+      return {grpc::StatusCode::UNAUTHENTICATED, verdict.problem};
     }
+    const Caller caller{verdict.certificate->name, verdict.certificate->roles};
     if (is_for_everyone(path)) {
       return caller.roles.empty()
                  ? grpc::Status(grpc::StatusCode::PERMISSION_DENIED,
@@ -153,13 +120,12 @@ class ServerGate::Guard {
   using Calls = std::list<std::pair<grpc::ServerContextBase*, const Certificate>>;
   // The call is cancelled when its certificate is no longer good, until it is forgotten.
   [[nodiscard]] std::optional<Calls::iterator> remember(grpc::ServerContextBase& context) {
-    const std::string pem = pem_of(*context.auth_context());
-    const std::lock_guard lock(mutex_);
-    const Certificate* certificate = find(pem);
-    if (certificate == nullptr) {
+    const Admission::Verdict verdict = admission_.judge(pem_of(*context.auth_context()));
+    if (!verdict.certificate) {
       return std::nullopt;
     }
-    return calls_.insert(calls_.end(), {&context, *certificate});
+    const std::lock_guard lock(mutex_);
+    return calls_.insert(calls_.end(), {&context, *verdict.certificate});
   }
   void forget(Calls::iterator call) {
     const std::lock_guard lock(mutex_);
@@ -167,84 +133,22 @@ class ServerGate::Guard {
   }
 
  private:
-  // Null when it is none of weft's. Valid while mutex_ is held.
-  [[nodiscard]] const Certificate* find(const std::string& pem) {
-    const auto found = certificates_.find(pem);
-    if (found != certificates_.end()) {
-      return &found->second;
-    }
-    if (certificates_.size() >= kCertificatesLimit) {
-      certificates_.clear();
-    }
-    try {
-      return &certificates_.emplace(pem, read_certificate(pem)).first->second;
-    } catch (const core::Error&) {
-      return nullptr;
-    }
-  }
-
-  [[nodiscard]] std::string problem_of(const Certificate& certificate) const {
-    const auto revoked = revoked_.find(certificate.serial);
-    if (revoked != revoked_.end()) {
-      return fmt::format(
-          "the certificate of '{}' was revoked on {}; ask whoever keeps the "
-          "authority '{}' for another",
-          certificate.name, date_text(revoked->second), certificate.issuer);
-    }
-    if (core::system_clock().now() > certificate.valid_until) {
-      return fmt::format(
-          "the certificate of '{}' expired on {}; ask whoever keeps the authority "
-          "'{}' for another",
-          certificate.name, date_text(certificate.valid_until), certificate.issuer);
-    }
-    return "";
-  }
-
-  // Takes the list in the folder; a list that is gone leaves the last one in force.
-  void load_list() {
-    const FileState state = state_of(folder_.revoked());
-    if (state.is_there) {
-      revoked_ = read_revocations(core::read_file(folder_.revoked(), kListLimitBytes),
-                                  core::read_file(folder_.authority(), kListLimitBytes));
-    }
-    list_state_ = state;
-  }
-
   void look_now_and_then() {
     std::unique_lock lock(mutex_);
     while (!wake_.wait_for(lock, kBetweenLooks, [this] { return ending_; })) {
-      if (!(state_of(folder_.revoked()) == list_state_)) {
-        reload_list();
-      }
+      admission_.refresh();
       for (const auto& [context, certificate] : calls_) {
-        if (!problem_of(certificate).empty()) {
+        if (!admission_.problem_of(certificate).empty()) {
           context->TryCancel();
         }
       }
     }
   }
 
-  void reload_list() {
-    const FileState seen = state_of(folder_.revoked());
-    try {
-      load_list();
-      spdlog::info("event=revocations_loaded file={} certificates={}", folder_.revoked().string(),
-                   revoked_.size());
-    } catch (const core::Error& error) {
-      list_state_ = seen;
-      spdlog::error(
-          "event=revocations_refused file={} message=\"{}; the last list stays in force\"",
-          folder_.revoked().string(), error.what());
-    }
-  }
-
-  const TlsFolder folder_;
+  Admission admission_;
   std::mutex mutex_;  // guards all below
   std::condition_variable wake_;
   bool ending_ = false;
-  Certificates certificates_;  // by their PEM
-  Revocations revoked_;
-  FileState list_state_;
   Calls calls_;
   std::thread thread_;
 };
