@@ -24,7 +24,7 @@ MAY_INCLUDE = {
 MAY_INCLUDE["cli"] = set(MAY_INCLUDE) | {"cli"}
 
 # Folders inside a folder, each of which may include those before it.
-ORDER = {"coordinator": ["queue", "journal", "versions", "scheduler", "services"]}
+ORDER = {"coordinator": ["queue", "journal", "versions", "scheduler", "services", "web"]}
 
 # Third-party header -> the files that alone include it.
 BEHIND = {
@@ -32,11 +32,14 @@ BEHIND = {
                            "storage/h5_types.cpp"},
     r"embree3/.*": {"transport/embree_scene.cpp", "render/triangle_scene.cpp"},
     r"(OpenEXR/)?Imf.*": {"render/image.cpp", "render/files/exr_parser.cpp"},
-    r"png\.h": {"render/png.cpp", "render/files/png_parser.cpp"},
+    r"png\.h": {"render/png.cpp", "render/files/png_parser.cpp", "coordinator/web/png.cpp"},
     r"vulkan/.*": {"render/gpu/vulkan.h"},
     r"sqlite3\.h": {"coordinator/journal/sqlite.cpp"},
     r"tiny_obj_loader\.h": {"render/files/obj_parser.cpp"},
-    r"openssl/.*": {"core/digest.cpp", "security/x509.cpp", "security/tls_probe.cpp"},
+    r"openssl/.*": {"core/digest.cpp", "security/x509.cpp", "security/tls_probe.cpp",
+                     "security/web_gate.cpp"},
+    r"httplib\.h": {"coordinator/web/http_server.cpp"},
+    r"prometheus/.*": {"coordinator/web/metrics.cpp"},
     r"Random123/.*": {"core/random.h"},
 }
 
