@@ -204,6 +204,11 @@ std::vector<v1::Worker> Scheduler::workers() {
   return workers;
 }
 
+Census Scheduler::census() {
+  const std::lock_guard lock(mutex_);
+  return census_of(queue_, clock_.now());
+}
+
 // The worker that has this name, this id, or alone an id that begins so; nothing when there is
 // none.
 const WorkerState* Scheduler::find_worker(const std::string& name_or_id) const {

@@ -135,6 +135,9 @@ void Scheduler::load(const JobRecord& record) {
 Journal::Ticket Scheduler::apply(const Event& event, Reply* reply, std::vector<Record> records) {
   Actions actions = queue_.apply(event, clock_.now());
   log(actions);
+  if (options_.hooks.acted) {
+    options_.hooks.acted(actions);
+  }
   std::vector<Record> of_event = records_of(actions);
   records.insert(records.end(), std::make_move_iterator(of_event.begin()),
                  std::make_move_iterator(of_event.end()));
@@ -206,6 +209,9 @@ void Scheduler::end_job(const std::string& id, std::vector<Record>& records) {
   v1::Job job = message(id);
   spdlog::info("job={} fabric={} event=ended state={} error=\"{}\"", id, job.fabric(),
                v1::JobState_Name(job.state()), job.error());
+  if (options_.hooks.job_ended) {
+    options_.hooks.job_ended(job);
+  }
   records.emplace_back(JobEndRecord{id, job.ended_at_ms(), v1::canonical_bytes(job)});
   ended_[id] = std::move(job);
   ended_order_.push_back(id);

@@ -20,6 +20,7 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/journal/order_log.h"
 #include "coordinator/queue/queue.h"
+#include "coordinator/scheduler/census.h"
 #include "coordinator/scheduler/log_store.h"
 #include "coordinator/scheduler/messages.h"
 #include "coordinator/scheduler/waiting_calls.h"
@@ -37,6 +38,13 @@ using CommitFunction = std::function<core::Digest(
     const std::function<std::string(const core::Digest&)>& read_blob,
     const std::filesystem::path& path)>;
 
+// Who counts what happens. Called with the scheduler's lock held: quickly, and without calling the
+// scheduler. Empty functions are not called.
+struct SchedulerHooks {
+  std::function<void(const Actions& actions)> acted;  // after every event
+  std::function<void(const v1::Job& job)> job_ended;
+};
+
 struct SchedulerOptions {
   std::filesystem::path state_folder;  // docs/architecture.md says what is in it
   QueueSettings queue;
@@ -46,6 +54,7 @@ struct SchedulerOptions {
   // When our own disk fails, planning and assembling are tried again after so long, then after
   // twice as long each time, for a quarter of an hour.
   std::chrono::milliseconds put_off{1000};
+  SchedulerHooks hooks;
 };
 
 inline constexpr std::size_t kUnfinishedJobsLimit = 1000;
@@ -85,6 +94,8 @@ class Scheduler {
   [[nodiscard]] std::vector<v1::AttemptInfo> attempts(const v1::ListAttemptsRequest& request);
 
   [[nodiscard]] std::vector<v1::Worker> workers();
+  [[nodiscard]] Census census();
+  [[nodiscard]] std::uint64_t journal_bytes() const { return journal_.size_bytes(); }
   // Both answer with all workers of that name.
   [[nodiscard]] std::vector<v1::Worker> drain(const Order& order, bool is_drained);
   [[nodiscard]] std::vector<v1::Worker> unblock(const Order& order, const std::string& stage);

@@ -1,5 +1,6 @@
 #include "coordinator/services/catalogue_service.h"
 
+#include "coordinator/scheduler/listings.h"
 #include "coordinator/scheduler/messages.h"
 #include "coordinator/services/rpc.h"
 #include "core/clock.h"
@@ -27,12 +28,7 @@ grpc::Status CatalogueService::ListFabrics(grpc::ServerContext* context,
                                            const v1::ListFabricsRequest* /*request*/,
                                            v1::ListFabricsResponse* response) {
   return answer(*context, "CatalogueService.ListFabrics", [&] {
-    for (const VersionRecord& latest : catalogue_.latest_versions()) {
-      v1::Fabric& fabric = *response->add_fabrics();
-      fabric.set_name(latest.fabric);
-      fabric.set_versions(catalogue_.versions(latest.fabric).size());
-      *fabric.mutable_latest() = message_of(latest);
-    }
+    *response = list_fabrics(catalogue_);
     return grpc::Status::OK;
   });
 }
@@ -41,10 +37,7 @@ grpc::Status CatalogueService::ListVersions(grpc::ServerContext* context,
                                             const v1::ListVersionsRequest* request,
                                             v1::ListVersionsResponse* response) {
   return answer(*context, "CatalogueService.ListVersions", [&] {
-    (void)catalogue_.find(request->fabric() + "@latest");  // says it well when there is none
-    for (const VersionRecord& version : catalogue_.versions(request->fabric())) {
-      *response->add_versions() = message_of(version);
-    }
+    *response = list_versions(catalogue_, request->fabric());
     return grpc::Status::OK;
   });
 }
@@ -147,12 +140,7 @@ grpc::Status CatalogueService::ListHistory(grpc::ServerContext* context,
                                            const v1::ListHistoryRequest* request,
                                            v1::ListHistoryResponse* response) {
   return answer(*context, "CatalogueService.ListHistory", [&] {
-    (void)catalogue_.find(request->fabric() + "@latest");  // says it well when there is none
-    const bool has_limit = request->limit() > 0 && request->limit() < v1::kListLimit;
-    for (const HistoryRecord& step :
-         catalogue_.history(request->fabric(), has_limit ? request->limit() : v1::kListLimit)) {
-      *response->add_entries() = message_of(step);
-    }
+    *response = list_history(catalogue_, request->fabric(), request->limit());
     return grpc::Status::OK;
   });
 }
