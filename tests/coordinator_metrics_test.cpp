@@ -50,10 +50,9 @@ TEST_F(PageTest, MetricsCountWhatHappened) {
   EXPECT_EQ(figure("weft_coordinator_healthy"), 1);
   EXPECT_EQ(figure("weft_queue_runnable_shards") >= 0, true);
   open({});  // which counts anew what is on the disk
-  while (figure("weft_store_bytes{store=\"results\"}") < 0) {
+  while (figure("weft_store_bytes{store=\"results\"}") <= 0) {
     std::this_thread::yield();  // counted in a thread of its own
   }
-  EXPECT_GT(figure("weft_store_bytes{store=\"results\"}"), 0);
   EXPECT_GT(figure("weft_page_requests_total{status=\"200\"}"), 0);
 }
 
