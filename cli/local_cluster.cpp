@@ -31,6 +31,9 @@ constexpr int kRestartLimit = 5;
 constexpr const char* kNoTls = "";
 constexpr std::chrono::milliseconds kPoll{100};
 constexpr const char* kReadyLine = "weft-coordinator ready at ";
+constexpr const char* kPageLine = "weft-coordinator page at ";
+constexpr double kPageSeconds = 2;  // its line follows the other one at once
+constexpr const char* kRenderNode = "render";
 
 std::string last_line(const std::filesystem::path& log) {
   std::string text;
@@ -74,6 +77,10 @@ void LocalCluster::start(core::Interrupt& interrupt) {
     workers_.push_back({fmt::format("worker-{}", i + 1), nullptr, 0});
     start_worker(workers_.back());
   }
+  if (options_.render) {
+    render_node_.emplace(Worker{kRenderNode, nullptr, 0});
+    start_worker(*render_node_);
+  }
   wait_for_workers(interrupt);
 }
 
@@ -82,6 +89,9 @@ void LocalCluster::watch(core::Interrupt& interrupt) {
     throw_if_coordinator_ended();
     for (Worker& worker : workers_) {
       restart_if_ended(worker);
+    }
+    if (render_node_) {
+      restart_if_ended(*render_node_);
     }
     if (std::all_of(workers_.begin(), workers_.end(),
                     [](const Worker& worker) { return worker.process == nullptr; })) {
@@ -102,6 +112,7 @@ void LocalCluster::print(bool wants_json) const {
                 {"pid", coordinator_->pid()},
                 {"workers", workers},
                 {"threads_per_worker", options_.threads},
+                {"page", page_.empty() ? nlohmann::json(nullptr) : nlohmann::json(page_)},
                 {"state", options_.state.string()}});
   } else {
     fmt::print("coordinator  {}  pid {}\n", address_, coordinator_->pid());
@@ -109,18 +120,33 @@ void LocalCluster::print(bool wants_json) const {
       fmt::print("{:<11}  {} threads  pid {}\n", worker.name, options_.threads,
                  worker.process->pid());
     }
+    if (render_node_) {
+      fmt::print("{:<11}  pid {}\n", render_node_->name, render_node_->process->pid());
+    }
     fmt::print("state        {}\n", options_.state.string());
+    if (!page_.empty()) {
+      fmt::print("page         {}\n", page_);
+    }
     fmt::print("ready: 'weft submit FABRIC --coordinator {}'; Ctrl-C stops all\n", address_);
   }
   std::fflush(stdout);
 }
 
 void LocalCluster::start_coordinator(core::Interrupt& interrupt) {
-  coordinator_ = std::make_unique<ChildProcess>(
-      std::vector<std::string>{(program_folder() / "weft-coordinator").string(), "--listen",
-                               options_.listen, "--state", options_.state.string(), "--tls-folder",
-                               kNoTls},
-      log_of("coordinator"), true);
+  std::vector<std::string> command{(program_folder() / "weft-coordinator").string(),
+                                   "--listen",
+                                   options_.listen,
+                                   "--state",
+                                   options_.state.string(),
+                                   "--tls-folder",
+                                   kNoTls};
+  if (!options_.http.empty()) {
+    command.insert(command.end(), {"--http", options_.http});
+  }
+  if (options_.render) {
+    command.insert(command.end(), {"--render-node", render_address()});
+  }
+  coordinator_ = std::make_unique<ChildProcess>(command, log_of("coordinator"), true);
   const core::Stopwatch since_start;
   while (address_.empty()) {
     throw_if_interrupted(interrupt);
@@ -136,6 +162,8 @@ void LocalCluster::start_coordinator(core::Interrupt& interrupt) {
                             "; its log is " + log_of("coordinator").string());
     }
   }
+  const std::string line = coordinator_->read_line(kPageSeconds).value_or("");
+  page_ = line.starts_with(kPageLine) ? line.substr(std::string(kPageLine).size()) : "";
 }
 
 void LocalCluster::throw_if_coordinator_ended() {
@@ -162,13 +190,35 @@ void LocalCluster::throw_if_a_worker_ended() {
   }
 }
 
+std::string LocalCluster::render_address() const {
+  return "unix:" + (options_.state / "render.socket").string();
+}
+
+std::vector<std::string> LocalCluster::command_of(const Worker& worker) const {
+  if (worker.name == kRenderNode) {
+    return {(program_folder() / "weft-render").string(),
+            "--coordinator",
+            address_,
+            "--listen",
+            render_address(),
+            "--tls-folder",
+            kNoTls};
+  }
+  return {(program_folder() / "weft-worker").string(),
+          "--coordinator",
+          address_,
+          "--name",
+          worker.name,
+          "--threads",
+          std::to_string(options_.threads),
+          "--scratch",
+          (options_.state / "scratch").string(),
+          "--tls-folder",
+          kNoTls};
+}
+
 void LocalCluster::start_worker(Worker& worker) const {
-  worker.process = std::make_unique<ChildProcess>(
-      std::vector<std::string>{(program_folder() / "weft-worker").string(), "--coordinator",
-                               address_, "--name", worker.name, "--threads",
-                               std::to_string(options_.threads), "--scratch",
-                               (options_.state / "scratch").string(), "--tls-folder", kNoTls},
-      log_of(worker.name), false);
+  worker.process = std::make_unique<ChildProcess>(command_of(worker), log_of(worker.name), false);
 }
 
 void LocalCluster::restart_if_ended(Worker& worker) const {
@@ -227,6 +277,7 @@ void LocalCluster::stop() {
     }
   }
   workers_.clear();  // kills what is left
+  render_node_.reset();
   if (coordinator_ != nullptr) {
     coordinator_->signal(SIGTERM);
     (void)coordinator_->wait(kCoordinatorStopSeconds);

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,11 +16,13 @@ struct LocalClusterOptions {
   unsigned threads = 0;         // of each worker; 0: the cores shared out between them
   std::filesystem::path state;  // journal, results, versions, logs/, scratch/
   std::string listen;           // host:port, port 0 for any free one, or unix:/path
+  std::string http;             // of the status page, as weft-coordinator takes it; empty: usual
+  bool render = false;          // a render node besides, which draws the page's swatches
 };
 
-// A coordinator and workers on this machine, as children of this process. They are stopped, workers
-// first so that they can report what they have finished, when the object goes; and end by
-// themselves should this process be killed. Of one thread.
+// A coordinator, workers and perhaps a render node on this machine, as children of this process.
+// They are stopped, workers first so that they can report what they have finished, when the object
+// goes; and end by themselves should this process be killed. Of one thread.
 class LocalCluster {
  public:
   // Makes the state folder. Throws core::Error(kUnavailable) when it cannot.
@@ -43,6 +46,7 @@ class LocalCluster {
   void print(bool wants_json) const;
 
  private:
+  // Or the render node, which is started again alike.
   struct Worker {
     std::string name;
     std::unique_ptr<ChildProcess> process;  // null when it was given up
@@ -52,6 +56,8 @@ class LocalCluster {
   [[nodiscard]] std::filesystem::path log_of(const std::string& name) const;
   void start_coordinator(core::Interrupt& interrupt);
   void start_worker(Worker& worker) const;
+  [[nodiscard]] std::vector<std::string> command_of(const Worker& worker) const;
+  [[nodiscard]] std::string render_address() const;
   void wait_for_workers(core::Interrupt& interrupt);
   void throw_if_coordinator_ended();
   void throw_if_a_worker_ended();
@@ -60,8 +66,10 @@ class LocalCluster {
 
   LocalClusterOptions options_;
   std::string address_;
+  std::string page_;  // its URL; empty: there is none
   std::unique_ptr<ChildProcess> coordinator_;
   std::vector<Worker> workers_;
+  std::optional<Worker> render_node_;
 };
 
 }  // namespace weft::cli

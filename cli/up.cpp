@@ -16,7 +16,7 @@ namespace weft::cli {
 namespace {
 
 constexpr const char* kHelp =
-    "Start a coordinator and workers on this machine, until Ctrl-C.\n"
+    "Start a coordinator with its status page and workers on this machine, until Ctrl-C.\n"
     "Prints the address when all are ready. The state (journal, results, published versions) and\n"
     "the logs stay in the state folder: started again, it goes on with the jobs it had. A worker\n"
     "that ends unasked is started again. SIGTERM and Ctrl-C stop everything, workers first; work\n"
@@ -68,6 +68,11 @@ void add_up(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--listen", options->cluster.listen, "Address; port 0 takes any free one")
       ->capture_default_str();
+  command->add_option(
+      "--http", options->cluster.http,
+      "HOST:PORT of the status page, or off; default: 127.0.0.1:7413 if it is free");
+  command->add_flag("--render", options->cluster.render,
+                    "Also start a render node, which draws the page's swatches");
   command->add_flag("--json", options->wants_json,
                     "When ready, print address and process ids as one JSON value");
   command->callback([options] { run(*options); });

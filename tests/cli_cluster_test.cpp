@@ -171,6 +171,7 @@ TEST(Cluster, UpStartsAllSaysWhereAndStopsAll) {
   const nlohmann::json json = nlohmann::json::parse(text);
   const std::string address = json.at("coordinator");
   ASSERT_EQ(json.at("workers").size(), 2U);
+  EXPECT_TRUE(json.at("page").get<std::string>().starts_with("http://127.0.0.1:")) << text;
 
   const Finished taken =
       run_weft(folder, {"up", "--state", folder / "other-state", "--listen", address});

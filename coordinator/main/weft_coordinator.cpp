@@ -91,6 +91,8 @@ int serve(const Options& options) {
   std::printf("weft-coordinator ready at %s\n", server.address().c_str());
   if (page != nullptr) {
     std::printf("weft-coordinator page at %s\n", page->url().c_str());
+  } else {
+    std::printf("weft-coordinator has no page\n");
   }
   std::fflush(stdout);
 

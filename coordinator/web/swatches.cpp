@@ -14,7 +14,7 @@ namespace {
 
 // A fabric that the node has not in its memory is fetched and read first.
 constexpr std::chrono::seconds kThumbnailWithin{120};
-constexpr std::chrono::seconds kPictureWithin{30};
+constexpr std::chrono::seconds kPictureWithin{60};
 constexpr const char* kPng = "image/png";
 
 HttpAnswer png_answer(std::string png) {

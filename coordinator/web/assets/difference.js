@@ -37,6 +37,11 @@ function fieldsOf(fields) {
   );
 }
 
+// Only of numbers it is said by how much they differ.
+function isText(dataset) {
+  return dataset.shape_from === dataset.shape_to && num(dataset.largest_difference) === 0;
+}
+
 function datasetsOf(datasets) {
   const other = datasets.filter((dataset) => !dataset.equal);
   if (other.length === 0) return el("p", {}, "The data are equal.");
@@ -48,7 +53,9 @@ function datasetsOf(datasets) {
         "tr",
         {},
         el("th", { scope: "row" }, el("code", {}, dataset.path)),
-        dataset.shape_from === dataset.shape_to
+        isText(dataset)
+          ? el("td", { colspan: 3 }, "another text")
+          : dataset.shape_from === dataset.shape_to
           ? [dataset.rms_difference, dataset.rms_from, dataset.largest_difference].map((value) => el("td", { class: "figure" }, figure(num(value))))
           : el("td", { colspan: 3 }, `${dataset.shape_from || "nothing"} became ${dataset.shape_to || "nothing"}`),
       ),

@@ -53,7 +53,8 @@ export function percent(share) {
 
 export function figure(value) {
   const size = Math.abs(value);
-  return value === 0 ? "0" : size >= 0.001 && size < 10000 ? value.toPrecision(3) : value.toExponential(2);
+  if (value !== 0 && (size < 0.001 || size >= 1e6)) return value.toExponential(2);
+  return Number(value.toPrecision(3)).toLocaleString("en", { maximumSignificantDigits: 3 });
 }
 
 // JOB_STATE_RUNNING, "JOB_STATE" is running.

@@ -1,7 +1,7 @@
 // The versions of a fabric, what changed between them, and its history.
 
 import { el, fill, setAttribute, setText } from "./dom.js";
-import { ago, bytes, list, num, percent, plural, when } from "./format.js";
+import { bytes, list, num, percent, plural, when } from "./format.js";
 import { ask } from "./live.js";
 import { difference } from "./difference.js";
 import { nodeNotice } from "./node.js";
@@ -70,7 +70,7 @@ export class FabricPage {
         {},
         el("div", { class: "line" }, el("a", { class: "name", href: `#/fabrics/${this.fabric}/${number}` }, `@${number}`), tags),
         version.comment ? el("p", { class: "comment" }, version.comment) : null,
-        el("p", { class: "small", title: when(num(version.published_at_ms)) }, `${ago(num(version.published_at_ms), this.live.now())}${version.user ? ` by ${version.user}` : ""} · ${about.join(" · ")}`),
+        el("p", { class: "small" }, `${when(num(version.published_at_ms))}${version.user ? ` by ${version.user}` : ""} · ${about.join(" · ")}`),
         compare ? el("p", { class: "small" }, compare) : null,
         compared,
       ),

@@ -18,7 +18,16 @@ export class FabricsPage {
 
   take(name, value) {
     if (name !== "fabrics") return;
-    const fabrics = list(value.fabrics);
+    this.fabrics = list(value.fabrics);
+    this.show();
+  }
+
+  tick() {
+    if (this.fabrics) this.show();
+  }
+
+  show() {
+    const fabrics = this.fabrics;
     setText(this.summary, fabrics.length ? `${plural(fabrics.length, "fabric")}, ${plural(fabrics.reduce((sum, fabric) => sum + num(fabric.versions), 0), "version")}.` : "Nothing was published yet: a job that succeeds publishes a version of its fabric.");
     keyed(this.grid, fabrics, (fabric) => `${fabric.name}@${num(fabric.latest.number)}`, (fabric) => new FabricCard(this.live, fabric));
   }

@@ -6,9 +6,10 @@ import { TurningPad } from "./turning_pad.js";
 
 // While something moves, pictures are as large as can be drawn in this time; then come finer ones.
 const DRAFT_S = 0.4;
-const FINE_S = 8;
+const FINE_S = 4;
 const SIZES = [64, 96, 128, 160, 192, 240, 288, 352, 416, 448];
 const SAMPLES = 8;
+const SLOWEST = 1000;  // pixels a second
 const SETTLED_MS = 200;
 const RETRY_MS = 1000;
 const SCALES_MM = [0.1, 0.2, 0.5, 1, 2, 5, 10];
@@ -33,7 +34,7 @@ export class SwatchViewer {
     this.status = el("p", { class: "small status", role: "status" });
     this.frame = el("div", { class: "frame", "data-state": "drawing" }, this.image, this.words, this.scale);
     this.pad = new TurningPad((change) => this.change(change));
-    this.element = el("section", { class: "viewer", "aria-label": "Swatch" }, el("div", { class: "sight" }, this.frame, this.status), this.controls());
+    this.element = el("section", { class: "viewer", "aria-label": "Swatch" }, el("div", { class: "sight" }, this.frame, this.status, el("div", { class: "pad-part" }, this.pad.element, el("button", { type: "button", class: "link reset", on: { click: () => this.change({ ...START }) } }, "As it was"))), this.controls());
     this.viewer = Math.random().toString(36).slice(2);
     this.pixelsPerSecond = 160 * 160 / DRAFT_S;  // a guess, until the first one was drawn
     this.listenToDrags();
@@ -53,7 +54,7 @@ export class SwatchViewer {
       from: (value) => (value === "parallel" ? 100 : Math.round(10 * Math.log2(value))),
       text: (value) => (value === "parallel" ? "parallel" : value < 8 ? `${value}, soft` : value < 100 ? `${value}` : `${value}, hard`),
     });
-    const degrees = { text: (value) => `${Math.round(value)}°` };
+    const degrees = { text: (value) => `${signed(Math.round(value))}°` };
     return el(
       "form",
       { class: "controls", on: { submit: (event) => event.preventDefault() } },
@@ -73,7 +74,7 @@ export class SwatchViewer {
         this.range("camera_azimuth", "Around", -180, 180, 3, degrees),
         this.range("camera_elevation", "Height", 15, 90, 3, degrees),
         this.range("height", "Shows", -20, 40, 1, { to: (value) => Number((10 ** (value / 20) * 1).toPrecision(2)), from: (value) => Math.round(20 * Math.log10(value)), text: (value) => `${value} mm` }),
-        this.range("brightness", "Exposure", -3, 3, 0.25, { text: (value) => `${value > 0 ? "+" : ""}${value} stops` }),
+        this.range("brightness", "Exposure", -3, 3, 0.25, { text: (value) => `${value > 0 ? "+" : ""}${signed(value)} stops` }),
       ),
       el(
         "fieldset",
@@ -81,7 +82,6 @@ export class SwatchViewer {
         el("legend", {}, "Scattering"),
         SCATTERINGS.map(([value, label]) => this.radio("scattering", value, label)),
       ),
-      el("div", { class: "pad-part" }, this.pad.element, el("button", { type: "button", class: "link", on: { click: () => this.change({ ...START }) } }, "As it was")),
     );
   }
 
@@ -164,7 +164,11 @@ export class SwatchViewer {
       } catch (problem) {
         if (this.gone) return;
         if (problem.name === "AbortError" || problem.code === "cancelled") continue;
-        if (problem.code === "resource_exhausted") {
+        if (this.isFine && problem.code === "unavailable" && this.pixelsPerSecond > SLOWEST) {
+          // It took too long: a smaller one will do.
+          this.pixelsPerSecond /= 8;
+          this.wish ??= view;
+        } else if (problem.code === "resource_exhausted") {
           setText(this.status, "The render node is busy; trying again");
           await pause(RETRY_MS);
           this.wish ??= view;
@@ -215,6 +219,7 @@ export class SwatchViewer {
   }
 }
 
+const signed = (value) => String(value).replace("-", "−");
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 export function wrapped(degrees) {
