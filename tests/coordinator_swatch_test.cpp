@@ -314,5 +314,33 @@ TEST_F(SwatchesTest, SoManyPicturesAtATimeAndNoneHoldsUpTheEnd) {
   }
 }
 
+TEST_F(SwatchesTest, WhatAViewerWishesNowEndsWhatItWishedBefore) {
+  node_->is_slow = true;
+  const auto ask = [this](const std::string& viewer, int* status) {
+    return std::thread([this, viewer, status] {
+      httplib::Client client(page_->url().substr(0, page_->url().size() - 1));
+      client.set_read_timeout(60);
+      const httplib::Result result = client.Get("/api/swatches/tiny/1?viewer=" + viewer);
+      *status = result ? result->status : 0;
+    });
+  };
+  int before = 0;
+  int other = 0;
+  int now = 0;
+  std::thread first = ask("ann", &before);
+  std::thread somebody = ask("bob", &other);
+  while (node_->orders < 2) {
+    std::this_thread::yield();
+  }
+  std::thread second = ask("ann", &now);
+  first.join();  // though the node still draws for it
+  EXPECT_EQ(before, 503);
+  node_->is_slow = false;
+  second.join();
+  somebody.join();
+  EXPECT_EQ(now, 200);
+  EXPECT_EQ(other, 200);
+}
+
 }  // namespace
 }  // namespace weft::coordinator

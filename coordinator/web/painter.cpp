@@ -28,15 +28,16 @@ std::string new_request_id() {
   return fmt::format("page-{:08x}{:08x}{:08x}", random(), random(), random());
 }
 
-[[noreturn]] void throw_away(const std::string& address, const grpc::Status& status) {
-  throw core::Error(core::Code::kUnavailable, "the render node at " + address +
-                                                  " does not answer (" + status.error_message() +
-                                                  "); is weft-render running there?");
+// What gRPC says of a node that cannot be reached would not help a person.
+[[noreturn]] void throw_away(const std::string& address) {
+  throw core::Error(
+      core::Code::kUnavailable,
+      "the render node at " + address + " does not answer; is weft-render running there?");
 }
 
 void throw_unless_ok(const grpc::Status& status, const std::string& address) {
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE) {
-    throw_away(address, status);
+    throw_away(address);
   }
   if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
     throw core::Error(core::Code::kUnavailable,
@@ -141,7 +142,13 @@ Painter::Painting Painter::paint(const v1::Scene& scene, std::chrono::millisecon
     static_cast<void>(stream->Finish());
     throw;
   }
-  throw_unless_ok(stream->Finish(), address_);
+  const grpc::Status status = stream->Finish();
+  if (status.error_code() == grpc::StatusCode::UNAVAILABLE &&
+      channel_->GetState(false) == GRPC_CHANNEL_READY) {
+    throw core::Error(core::Code::kUnavailable, "the render node at " + address_ +
+                                                    " cannot draw now: " + status.error_message());
+  }
+  throw_unless_ok(status, address_);
   if (wanted == 0 || bytes.size() < wanted) {
     throw core::Error(core::Code::kDataLoss, "the render node ended before the picture had come");
   }
@@ -164,7 +171,7 @@ v1::GetNodeResponse Painter::node() {
   v1::GetNodeResponse response;
   const grpc::Status status = stub_->GetNode(&context, v1::GetNodeRequest(), &response);
   if (!status.ok()) {
-    throw_away(address_, status);
+    throw_away(address_);
   }
   return response;
 }

@@ -72,3 +72,6 @@ export function hex(base64, digits = 12) {
 export function sentence(text) {
   return text ? text[0].toUpperCase() + text.slice(1) + (/[.!?…]$/.test(text) ? "" : ".") : "";
 }
+
+// Whether a user is known: without certificates jobs are nobody's.
+export const named = (user) => Boolean(user) && user !== "nobody";

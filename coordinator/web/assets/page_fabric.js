@@ -1,7 +1,7 @@
 // The versions of a fabric, what changed between them, and its history.
 
 import { el, fill, setAttribute, setText } from "./dom.js";
-import { bytes, list, num, percent, plural, when } from "./format.js";
+import { bytes, list, named, num, percent, plural, when } from "./format.js";
 import { ask } from "./live.js";
 import { difference } from "./difference.js";
 import { nodeNotice } from "./node.js";
@@ -70,7 +70,7 @@ export class FabricPage {
         {},
         el("div", { class: "line" }, el("a", { class: "name", href: `#/fabrics/${this.fabric}/${number}` }, `@${number}`), tags),
         version.comment ? el("p", { class: "comment" }, version.comment) : null,
-        el("p", { class: "small" }, `${when(num(version.published_at_ms))}${version.user ? ` by ${version.user}` : ""} · ${about.join(" · ")}`),
+        el("p", { class: "small" }, `${when(num(version.published_at_ms))}${named(version.user) ? ` by ${version.user}` : ""} · ${about.join(" · ")}`),
         compare ? el("p", { class: "small" }, compare) : null,
         compared,
       ),
@@ -80,6 +80,6 @@ export class FabricPage {
   entryOf(entry) {
     const number = num(entry.number);
     const what = { published: `@${number} was published`, tagged: `@${number} got the tag ${entry.tag}`, untagged: `@${number} lost the tag ${entry.tag}`, rolled_back: `@${number} became the latest again` }[entry.action] ?? `${entry.action} @${number}`;
-    return el("li", {}, el("time", {}, when(num(entry.at_ms))), ` ${what}${entry.user ? `, by ${entry.user}` : ""}${entry.comment ? `: ${entry.comment}` : ""}`);
+    return el("li", {}, el("time", {}, when(num(entry.at_ms))), ` ${what}${named(entry.user) ? `, by ${entry.user}` : ""}${entry.comment ? `: ${entry.comment}` : ""}`);
   }
 }

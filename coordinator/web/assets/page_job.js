@@ -2,7 +2,7 @@
 
 import { AttemptList } from "./attempts.js";
 import { el, fill, keyed, setAttribute, setText } from "./dom.js";
-import { ago, bytes, duration, list, num, percent, plural, rate, sentence, when, word } from "./format.js";
+import { ago, bytes, duration, list, named, num, percent, plural, rate, sentence, when, word } from "./format.js";
 import { ReasonList } from "./reasons.js";
 import { chip, fractionOf, jobState, stateOf, updateChip } from "./stages.js";
 
@@ -100,7 +100,7 @@ export class JobPage {
 
   showAbout(job) {
     const parts = [job.id];
-    if (job.user) parts.push(`for ${job.user}`);
+    if (named(job.user)) parts.push(`for ${job.user}`);
     parts.push(`submitted ${ago(num(job.submitted_at_ms), this.live.now())}`);
     if (num(job.ended_at_ms)) parts.push(`ended ${when(num(job.ended_at_ms))}, after ${duration((num(job.ended_at_ms) - num(job.submitted_at_ms)) / 1000)}`);
     if (num(job.priority)) parts.push(`priority ${num(job.priority)}`);

@@ -1,7 +1,7 @@
 // All jobs at a glance.
 
 import { el, keyed, setAttribute, setText } from "./dom.js";
-import { ago, duration, list, num, plural } from "./format.js";
+import { ago, duration, list, named, num, plural } from "./format.js";
 import { StageStrip, chip, inWords, jobState, updateChip } from "./stages.js";
 
 export class JobsPage {
@@ -92,7 +92,7 @@ class JobRow {
     setAttribute(this.strip.element, "hidden", isEnded ? "" : null);
     if (!isEnded) this.strip.update(job);
     setText(this.words, inWords(job));
-    const user = job.user ? `${job.user} · ` : "";
+    const user = named(job.user) ? `${job.user} · ` : "";
     const priority = num(job.priority) ? ` · priority ${num(job.priority)}` : "";
     setText(
       this.aside,

@@ -2,7 +2,7 @@
 
 import { difference } from "./difference.js";
 import { el, fill } from "./dom.js";
-import { bytes, hex, list, num, percent, when } from "./format.js";
+import { bytes, hex, list, named, num, percent, when } from "./format.js";
 import { ask } from "./live.js";
 import { showTags } from "./page_fabrics.js";
 import { SwatchViewer } from "./swatch.js";
@@ -57,7 +57,7 @@ export class VersionPage {
     }
     const size = num(version.size_bytes);
     const facts = [
-      ["Published", `${when(num(version.published_at_ms))}${version.user ? `, by ${version.user}` : ""}`],
+      ["Published", `${when(num(version.published_at_ms))}${named(version.user) ? `, by ${version.user}` : ""}`],
       ["Size", `${bytes(size)}${num(version.shared_bytes) ? `, ${percent(num(version.shared_bytes) / size)} of it was on the disk before` : ""}`],
       ["Computed", `${num(version.computed_shards).toLocaleString("en")} shards, ${num(version.cached_shards).toLocaleString("en")} were known`],
       ["Made by", version.job_id ? el("a", { href: `#/jobs/${version.job_id}` }, version.job_id) : "an import"],

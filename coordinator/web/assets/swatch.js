@@ -1,6 +1,7 @@
 // A swatch that is drawn anew as one turns its light and its camera.
 
 import { el, fill, setText } from "./dom.js";
+import { sentence } from "./format.js";
 import { problemOf } from "./live.js";
 import { TurningPad } from "./turning_pad.js";
 
@@ -12,6 +13,7 @@ const SAMPLES = 8;
 const SLOWEST = 1000;  // pixels a second
 const SETTLED_MS = 200;
 const RETRY_MS = 1000;
+const AWAY_MS = 3000;
 const SCALES_MM = [0.1, 0.2, 0.5, 1, 2, 5, 10];
 
 // As SwatchView in coordinator/web/swatch_view.h.
@@ -44,6 +46,7 @@ export class SwatchViewer {
 
   leave() {
     this.gone = true;
+    clearTimeout(this.later);
     this.request?.abort();
     if (this.url) URL.revokeObjectURL(this.url);
   }
@@ -143,6 +146,7 @@ export class SwatchViewer {
   // One picture at a time is asked for; of those wished for meanwhile, the last. A fine one that is
   // being drawn makes way.
   order(isMoving) {
+    clearTimeout(this.later);
     this.wish = { ...this.view };
     this.isMoving = isMoving;
     if (this.isFine) this.request?.abort();
@@ -177,7 +181,8 @@ export class SwatchViewer {
           this.isFine = false;
           this.frame.dataset.state = "failed";
           if (this.image.hidden) setText(this.words, "No picture");
-          setText(this.status, problem.message);
+          setText(this.status, sentence(problem.message));
+          if (problem.code === "unavailable") this.later = setTimeout(() => this.order(false), AWAY_MS);
           return;
         }
       }
