@@ -280,7 +280,7 @@ def ask_why_it_waits(browser, cluster, source):
                   lambda: "weft-worker" in browser.text(".reasons") or "weft workers" in browser.text(".reasons"))
     browser.one("#stage").send_keys("geometry")
     browser.one("#shard").send_keys("0", Keys.TAB)
-    browser.until("a task should be explained", lambda: "geometry" in browser.text(".verdict:not(:empty)"))
+    browser.until("a task should be explained", lambda: "Geometry 0: " in browser.text(".verdict:not(:empty)"))
     browser.shoot("waits")
 
 
@@ -301,7 +301,7 @@ def fit_every_page(browser, cluster):
                     browser.until("a picture should be drawn", lambda: browser.one(".frame img").is_displayed())
                 time.sleep(0.5)
                 wide = browser.script("return document.documentElement.scrollWidth")
-                browser.shoot(f"{scheme}_{width}_{page.replace('/', '_').split('_j')[0] or 'jobs'}")
+                browser.shoot(f"{scheme}_{width}_{page.replace('/', '_')[:14] or 'all'}")
                 check(wide <= width, f"{page or 'jobs'} is {wide} wide at {width}")
     check(len(colours) == 2, "light and dark look the same")
 

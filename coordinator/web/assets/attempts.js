@@ -79,7 +79,7 @@ export class AttemptList {
       return;
     }
     const why = await ask(`jobs/${this.job}/explain?stage=${stage}&shard=${shard}`);
-    setText(this.verdict, sentence(`${why.subject} ${why.verdict}`));
+    setText(this.verdict, sentence(`${stage} ${shard}: ${why.verdict}`));
     this.reasons.update(list(why.reasons), this.live.now(), why.verdict);
   }
 }

@@ -13,13 +13,14 @@ export class ReasonList {
     const reasons = all.filter((reason) => reason.mend || !verdict.includes(reason.text));
     setAttribute(this.element, "hidden", reasons.length ? null : "");
     const keys = reasons.map((reason, at) => ({ reason, at }));
-    keyed(this.element, keys, ({ reason, at }) => `${at} ${reason.code} ${reason.stage ?? ""} ${reason.worker ?? ""}`, () => new ReasonRow(nowMs));
+    keyed(this.element, keys, ({ reason, at }) => `${at} ${reason.code} ${reason.stage ?? ""} ${reason.worker ?? ""}`, () => new ReasonRow(nowMs, verdict));
   }
 }
 
 class ReasonRow {
-  constructor(nowMs) {
+  constructor(nowMs, verdict) {
     this.nowMs = nowMs;
+    this.verdict = verdict;
     this.text = el("span", {});
     this.mend = el("span", { class: "mend" });
     this.element = el("li", {}, this.text, this.mend);
@@ -29,7 +30,8 @@ class ReasonRow {
     const left = (num(reason.until_ms) - this.nowMs) / 1000;
     const until = left > 0 ? ` (for about ${duration(left)} more)` : "";
     setAttribute(this.element, "data-code", reason.code);
-    setText(this.text, `${sentence(reason.text + until)} `);
+    const isSaid = this.verdict.includes(reason.text) && until === "";
+    setText(this.text, isSaid ? "" : `${sentence(reason.text + until)} `);
     setText(this.mend, sentence(reason.mend ?? ""));
   }
 }
