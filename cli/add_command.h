@@ -11,6 +11,7 @@ namespace weft::cli {
 inline CLI::App* add_command(CLI::App& app, const std::string& name, const std::string& help) {
   const std::size_t end = help.find('\n');
   CLI::App* command = app.add_subcommand(name, help.substr(0, end));
+  command->group("Commands");
   if (end != std::string::npos) {
     command->footer(help.substr(end + 1));
   }

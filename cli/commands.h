@@ -43,6 +43,10 @@ void add_inspect(CLI::App& app);
 void add_verify(CLI::App& app);
 void add_render(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_doctor(CLI::App& app);
+void add_config(CLI::App& app);
 void add_certs(CLI::App& app);
+void add_completion(CLI::App& app);
+void add_man(CLI::App& app);
 
 }  // namespace weft::cli

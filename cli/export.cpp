@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/fibre_colours.h"
 #include "cli/print_json.h"
@@ -93,8 +94,10 @@ void export_fabric(const CommandOptions& options) {
 
 void add_export(CLI::App& app) {
   auto options = std::make_shared<CommandOptions>();  // shared: the callback outlives this function
-  CLI::App* command = app.add_subcommand(
-      "export", "Write a fabric's fibres as curves for other programs, in millimetres");
+  CLI::App* command =
+      add_command(app, "export",
+                  "Write a fabric's fibres as curves for other programs, in millimetres.\n"
+                  "Example: weft export silk.textproto -o silk.bcc");
   command->add_option("fabric", options->fabric, "Fabric description (.textproto or .json)")
       ->required();
   command->add_option("-o,--out", options->out, "File to write")->required();

@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/fabric_reference.h"
 #include "cli/import_database.h"
+#include "cli/interruption.h"
 #include "cli/output_file.h"
 #include "cli/present.h"
 #include "cli/print_json.h"
@@ -27,7 +28,8 @@ constexpr const char* kHelp =
     "Only what is not here already comes over the wire: an older version at OUTPUT and the "
     "versions\n"
     "that were fetched for rendering are looked through for equal pieces. A fetch that was broken\n"
-    "off goes on where it was (OUTPUT.DIGEST.part); the file is checked against its digest before\n"
+    "off, with Ctrl-C too, goes on where it was (OUTPUT.DIGEST.part); the file is checked against "
+    "its digest before\n"
     "it gets its name.\n"
     "With --import, a file from elsewhere takes the same way: it is copied, read whole by a\n"
     "program that can do nothing else, and gets its name when everything in it is right.\n"
@@ -42,14 +44,21 @@ struct FetchOptions {
   bool wants_json = false;
 };
 
-// Bytes so far, on a terminal only: a fetch takes seconds.
-client::FetchReport terminal_report() {
-  if (isatty(fileno(stderr)) != 1) {
-    return nullptr;
-  }
-  return [](std::uint64_t here, std::uint64_t total) {
-    fmt::print(stderr, "\r\x1b[K{} of {}{}", format_bytes(here), format_bytes(total),
-               here == total ? "\n" : "");
+// Bytes so far, on a terminal only: a fetch takes seconds. Ctrl-C ends the fetch.
+client::FetchReport report_on(const Interruption& interruption) {
+  return [&interruption, is_terminal = isatty(fileno(stderr)) == 1](std::uint64_t here,
+                                                                    std::uint64_t total) {
+    if (interruption.requested() && here < total) {
+      throw core::Error(
+          core::Code::kCancelled,
+          fmt::format("{}stopped; {} of {} are kept: run the same command again to "
+                      "go on",
+                      is_terminal ? "\n" : "", format_bytes(here), format_bytes(total)));
+    }
+    if (is_terminal) {
+      fmt::print(stderr, "\r\x1b[K{} of {}{}", format_bytes(here), format_bytes(total),
+                 here == total ? "\n" : "");
+    }
   };
 }
 
@@ -94,13 +103,14 @@ void run(const FetchOptions& options) {
     run_import(options);
     return;
   }
+  const Interruption interruption(1);
   Client connection(options.coordinator);
   const v1::Version version = client::find_version(connection, options.reference);
   const std::string output =
       options.output.empty() ? reference_text(version) + ".h5" : options.output;
   check_output_file(output);
   const client::FetchOutcome outcome =
-      client::fetch_version(connection, version, output, terminal_report(), pieces_here());
+      client::fetch_version(connection, version, output, report_on(interruption), pieces_here());
   if (options.wants_json) {
     print_json({{"output", output},
                 {"was_there", outcome.was_there},

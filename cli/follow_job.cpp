@@ -17,6 +17,8 @@ namespace {
 constexpr std::chrono::seconds kStreamDeadline{60};
 constexpr double kAwayLimitSeconds = 60;
 constexpr std::chrono::milliseconds kAwayWait{1000};
+// How long a person has to press Ctrl-C a second time.
+constexpr double kSecondThoughtSeconds = 3;
 
 bool has_ended(const v1::Job& job) {
   return job.state() == v1::JOB_STATE_SUCCEEDED || job.state() == v1::JOB_STATE_FAILED ||
@@ -26,8 +28,11 @@ bool has_ended(const v1::Job& job) {
 // Follows one job over as many streams as it takes.
 class JobFollower {
  public:
-  JobFollower(Client& client, std::string job_id)
-      : client_(client), job_id_(std::move(job_id)), printer_(stderr) {}
+  JobFollower(Client& client, std::string job_id, Interruption& interruption)
+      : client_(client),
+        job_id_(std::move(job_id)),
+        interruption_(interruption),
+        printer_(stderr) {}
 
   v1::Job follow() {
     while (true) {
@@ -35,6 +40,9 @@ class JobFollower {
       if (has_ended(job_)) {
         printer_.finish(stages_of(job_));
         return job_;
+      }
+      if (interruption_.requested()) {
+        leave();
       }
       if (status.error_code() == grpc::StatusCode::UNAVAILABLE) {
         wait_for_coordinator(status);
@@ -51,6 +59,7 @@ class JobFollower {
     request.set_job_id(job_id_);
     grpc::ClientContext context;
     Client::set_deadline(context, kStreamDeadline);
+    const Interruption::Call interruptible(interruption_, context);
     const auto reader = client_.jobs().WatchJob(&context, request);
     v1::WatchJobResponse response;
     while (reader->Read(&response)) {
@@ -63,6 +72,29 @@ class JobFollower {
       show();
     }
     return reader->Finish();
+  }
+
+  // Ends the following. The job goes on, unless a second Ctrl-C comes soon.
+  [[noreturn]] void leave() {
+    const std::string way_back =
+        "job " + job_id_ + " goes on; 'weft watch " + job_id_ + "' comes back to it";
+    if (interruption_.is_by_a_person()) {
+      printer_.note(way_back + "; Ctrl-C again cancels it");
+      if (interruption_.requested_again_within(kSecondThoughtSeconds)) {
+        cancel();
+        throw core::Error(core::Code::kCancelled, "job " + job_id_ + " is cancelled; 'weft retry " +
+                                                      job_id_ + "' goes on with it");
+      }
+    }
+    throw core::Error(core::Code::kCancelled, "stopped watching; " + way_back);
+  }
+
+  void cancel() {
+    v1::CancelJobRequest request;
+    request.set_request_id(new_request_id());
+    request.set_job_id(job_id_);
+    (void)client_.call_repeatedly(client_.jobs(), &v1::JobService::Stub::CancelJob, request,
+                                  "cancel " + job_id_);
   }
 
   void show() {
@@ -112,6 +144,7 @@ class JobFollower {
 
   Client& client_;
   std::string job_id_;
+  Interruption& interruption_;
   ProgressPrinter printer_;
   v1::Job job_;
   std::string waiting_for_;
@@ -125,8 +158,8 @@ class JobFollower {
 
 }  // namespace
 
-v1::Job follow_job(Client& client, const std::string& job_id) {
-  return JobFollower(client, job_id).follow();
+v1::Job follow_job(Client& client, const std::string& job_id, Interruption& interruption) {
+  return JobFollower(client, job_id, interruption).follow();
 }
 
 void throw_unless_succeeded(const v1::Job& job) {

@@ -193,9 +193,10 @@ void add_import(CLI::App& app) {
   auto command = std::make_shared<ImportCommand>();  // shared: the callback outlives this function
   CLI::App* import_app = add_command(
       app, "import",
-      "Make a fabric description of a weaving draft (WIF)\n"
+      "Make a fabric description of a weaving draft (WIF).\n"
       "Prints what the draft left open and what its cloth will need. The description has comments "
-      "and is meant to be edited.");
+      "and is meant to be edited.\n"
+      "Example: weft import draft.wif -o mine.textproto");
   import_app->add_option("draft", command->draft, "Weaving draft (.wif)")->required();
   import_app->add_option("-o,--out", command->out, "Description to write (.textproto)")->required();
   import_app->add_option("--name", command->name, "Name of the fabric (default: the file's)");

@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
@@ -213,10 +214,12 @@ void add_inspect(CLI::App& app) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();  // lives as long as the callback
-  CLI::App* const command = app.add_subcommand(
-      "inspect", "Show what a fabric database holds, how exact it is and what it was made from");
-  command->add_option("FILE", options->file, "fabric database (.h5)")->required();
-  command->add_flag("--json", options->json, "print one JSON value");
+  CLI::App* const command = add_command(app, "inspect",
+                                        "Show what a fabric database holds.\n"
+                                        "How exact it is, and what it was made from.\n"
+                                        "Example: weft inspect silk.h5");
+  command->add_option("FILE", options->file, "Fabric database (.h5)")->required();
+  command->add_flag("--json", options->json, "Print one JSON value on stdout");
   command->callback([options] {
     const Json json = summary_of(options->file);
     if (options->json) {

@@ -145,8 +145,10 @@ void write_new(const NewCommand& command) {
 void add_new(CLI::App& app) {
   auto command = std::make_shared<NewCommand>();  // shared: the callback outlives this function
   CLI::App* new_app = add_command(app, "new",
-                                  "Start a fabric description\n"
-                                  "Without -o the description goes to standard output.");
+                                  "Start a fabric description.\n"
+                                  "Without -o the description goes to standard output.\n"
+                                  "Examples: weft new --preset silk -o silk.textproto\n"
+                                  "          weft new --list");
   CLI::Option* preset =
       new_app->add_option("--preset", command->preset,
                           "A fabric (silk_plain, gabardine, ...) or a yarn (cotton1, ...)");

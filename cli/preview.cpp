@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/fibre_colours.h"
 #include "cli/print_json.h"
@@ -127,8 +128,9 @@ void preview(const PreviewOptions& options) {
 
 void add_preview(CLI::App& app) {
   auto options = std::make_shared<PreviewOptions>();  // shared: the callback outlives this function
-  CLI::App* command =
-      app.add_subcommand("preview", "Draw a fabric's fibres, before anything is precomputed");
+  CLI::App* command = add_command(app, "preview",
+                                  "Draw a fabric's fibres, before anything is precomputed.\n"
+                                  "Example: weft preview silk.textproto -o silk.png");
   command->add_option("fabric", options->fabric, "Fabric description (.textproto or .json)")
       ->required();
   command->add_option("-o,--out", options->out, "Picture to write (.png)")->required();

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,8 @@ constexpr const char* kHelp =
     "Queue the precomputation of a fabric with a coordinator.\n"
     "Every file that the description names is sent with it. Work that was done before, for any\n"
     "fabric, is not done again.\n"
-    "With --wait, progress is shown until the job has ended; Ctrl-C ends the waiting, not the "
-    "job.\n"
+    "With --wait, progress is shown until the job has ended; Ctrl-C ends the waiting, not the\n"
+    "job, and says how to come back; a second one within three seconds cancels the job.\n"
     "Example: weft submit examples/tiny.textproto --quality preview --wait -o tiny.h5";
 
 struct SubmitFlags {
@@ -60,6 +61,17 @@ v1::Job submit(Client& client, const v1::FabricDescription& description,
       .job();
 }
 
+// The job is done then; what came of its database is kept.
+void throw_if_interrupted(const Interruption& interruption, const v1::Version& version,
+                          const std::string& output) {
+  if (interruption.requested()) {
+    throw core::Error(core::Code::kCancelled,
+                      fmt::format("stopped fetching; the job is done, and 'weft fetch {} -o {}' "
+                                  "goes on where it was",
+                                  reference_text(version), output));
+  }
+}
+
 // What earlier work saved.
 std::string saved_text(const v1::Job& job) {
   std::uint64_t shards = 0;
@@ -83,19 +95,26 @@ void run(const SubmitFlags& options) {
   if (!options.output.empty()) {
     check_output_file(options.output);
   }
+  std::optional<Interruption> interruption;
+  if (options.is_waiting) {
+    interruption.emplace(kFollowInterrupts);
+  }
   Client connection(options.coordinator);
   v1::Job job = submit(connection, description, options.demands);
   fmt::print(stderr, "submitted {} as {}; 'weft watch {}' shows how far it is\n", job.fabric(),
              job.id(), job.id());
   if (options.is_waiting) {
-    job = follow_job(connection, job.id());
+    job = follow_job(connection, job.id(), *interruption);
   }
   if (job.state() == v1::JOB_STATE_SUCCEEDED && job.cached_bytes() > 0) {
     fmt::print(stderr, "{}\n", saved_text(job));
   }
   bool was_fetched = false;
   if (job.state() == v1::JOB_STATE_SUCCEEDED && !options.output.empty()) {
-    client::fetch_version(connection, job.version(), options.output, nullptr);
+    client::fetch_version(connection, job.version(), options.output,
+                          [&](std::uint64_t /*here*/, std::uint64_t /*total*/) {
+                            throw_if_interrupted(*interruption, job.version(), options.output);
+                          });
     was_fetched = true;
   }
   if (options.wants_json) {

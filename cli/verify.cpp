@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/print_json.h"
 #include "core/digest.h"
@@ -19,11 +20,13 @@ void add_verify(CLI::App& app) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();  // lives as long as the callback
-  CLI::App* const command = app.add_subcommand(
-      "verify", "Check that a fabric database is whole: recompute its digest and read all of it");
-  command->add_option("FILE", options->file, "fabric database (.h5)")->required();
+  CLI::App* const command = add_command(app, "verify",
+                                        "Check that a fabric database is whole.\n"
+                                        "Recomputes its digest and reads all of it.\n"
+                                        "Example: weft verify silk.h5");
+  command->add_option("FILE", options->file, "Fabric database (.h5)")->required();
   command->add_flag("--json", options->json,
-                    "print one JSON value, of a damaged file too (with \"valid\": false)");
+                    "Print one JSON value, of a damaged file too (with \"valid\": false)");
   command->callback([options] {
     nlohmann::ordered_json json{{"file", options->file.string()}};
     try {

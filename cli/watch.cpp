@@ -17,7 +17,8 @@ namespace {
 constexpr const char* kHelp =
     "Show a job's progress until it has ended.\n"
     "Per stage: the shards done, shards per second and the time left. Ctrl-C ends the watching,\n"
-    "not the job. Exits with 1 when the job failed or was cancelled.\n"
+    "not the job, and says how to come back; a second one within three seconds cancels the job.\n"
+    "Exits with 1 when the job failed, was cancelled, or is no longer watched.\n"
     "Example: weft watch j4f1c02a9d3be";
 
 struct WatchOptions {
@@ -27,8 +28,9 @@ struct WatchOptions {
 };
 
 void run(const WatchOptions& options) {
+  Interruption interruption(kFollowInterrupts);
   Client client(options.coordinator);
-  const v1::Job job = follow_job(client, options.job);
+  const v1::Job job = follow_job(client, options.job, interruption);
   if (options.wants_json) {
     print_json(to_json(job));
   }

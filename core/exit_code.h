@@ -5,7 +5,7 @@
 namespace weft::core {
 
 inline constexpr int kExitFailed = 1;    // the work failed, or an input is wrong
-inline constexpr int kExitWrongUse = 2;  // the command line is wrong
+inline constexpr int kExitWrongUse = 2;  // the command line or a setting is wrong
 inline constexpr int kExitNotFound = 3;
 inline constexpr int kExitRefused = 4;      // not allowed, or over a limit
 inline constexpr int kExitUnavailable = 5;  // the coordinator or a file system does not answer

@@ -29,6 +29,9 @@ class TestFolder {
     path_ = name;
     // What this user fetched before must not help, and what is fetched here goes with the folder.
     setenv("XDG_CACHE_HOME", (path_ / "cache").c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+    // Nor does what this user or this machine configured.
+    setenv("XDG_CONFIG_HOME", (path_ / "config").c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+    setenv("WEFT_SYSTEM_CONFIG", "", 1);                       // NOLINT(concurrency-mt-unsafe)
   }
   ~TestFolder() {
     std::error_code ignored;

@@ -41,6 +41,7 @@ BEHIND = {
     r"httplib\.h": {"coordinator/web/http_server.cpp"},
     r"prometheus/.*": {"coordinator/web/metrics.cpp"},
     r"Random123/.*": {"core/random.h"},
+    r"toml\+\+/.*": {"core/settings_file.cpp"},
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # The tests that take long: tests/long.sh [SEEDS [FIRST_SEED [FUZZ_SECONDS]]]
 # Simulated clusters (default: 10000 seeds from 1001 on), real processes that are killed again and
-# again and every flip of a byte (WEFT_LONG=1), and fuzzing (default: 600 s for each target; 0: none).
+# again and every flip of a byte (WEFT_LONG=1), the packages in a fresh Debian (with mmdebstrap), and
+# fuzzing (default: 600 s for each target; 0: none).
 # Wants a built tree (tests/run.sh --build-only). Prints the time that each part took.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -11,7 +12,7 @@ first=${2:-1001}
 fuzz_seconds=${3:-600}
 for number in "$seeds" "$first" "$fuzz_seconds"; do
   if ! [[ $number =~ ^[0-9]+$ ]]; then
-    sed -n '2,5s/^# //p' "$0" >&2
+    sed -n '2,6s/^# //p' "$0" >&2
     exit 2
   fi
 done
@@ -44,6 +45,11 @@ simulate() {
 part simulation simulate
 export WEFT_LONG=1
 part real_processes_and_flips ctest --test-dir build --output-on-failure -R 'Faults|Flips' --timeout 14400
+if command -v mmdebstrap >/dev/null; then
+  part packages_in_a_fresh_debian tests/packages.sh build --bootstrap
+else
+  echo "== packages_in_a_fresh_debian: skipped, mmdebstrap is not installed"
+fi
 if [ "$fuzz_seconds" -gt 0 ]; then
   part fuzzing fuzz/run.sh "$fuzz_seconds"
 fi

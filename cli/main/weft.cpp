@@ -1,56 +1,42 @@
 #include <cstdio>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "cli/commands.h"
+#include "cli/application.h"
+#include "cli/known_names.h"
+#include "core/mistakes.h"
 #include "core/program.h"
 #include "security/grpc_setup.h"
 
+namespace {
+
+// CLI11 would only say that a word was not expected.
+bool is_unknown_command(const CLI::App& app, const std::string& word) {
+  if (word.empty() || word.starts_with('-') || word.starts_with("__")) {
+    return false;
+  }
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) {
+    if (command->check_name(word)) {
+      return false;
+    }
+    names.push_back(command->get_name());
+  }
+  std::fprintf(stderr, "weft: there is no command %s%s\n'weft --help' lists them\n",
+               weft::core::in_quotes(word).c_str(), weft::core::suggestion(word, names).c_str());
+  return true;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  namespace cli = weft::cli;
-  namespace core = weft::core;
-  CLI::App app{"weft shows cloth as it is: from a weaving draft to a picture of every fibre."};
-  core::set_program_name(app, "weft");
-  app.require_subcommand(1);
-  // One line per command, in the order of commands.h.
-  cli::add_new(app);
-  cli::add_import(app);
-  cli::add_preview(app);
-  cli::add_export(app);
-  cli::add_run(app);
-  cli::add_up(app);
-  cli::add_submit(app);
-  cli::add_jobs(app);
-  cli::add_watch(app);
-  cli::add_explain(app);
-  cli::add_logs(app);
-  cli::add_pause(app);
-  cli::add_resume(app);
-  cli::add_priority(app);
-  cli::add_cancel(app);
-  cli::add_retry(app);
-  cli::add_workers(app);
-  cli::add_drain(app);
-  cli::add_unblock(app);
-  cli::add_fabrics(app);
-  cli::add_versions(app);
-  cli::add_fetch(app);
-  cli::add_log(app);
-  cli::add_diff(app);
-  cli::add_tag(app);
-  cli::add_untag(app);
-  cli::add_rollback(app);
-  cli::add_gc(app);
-  cli::add_inspect(app);
-  cli::add_verify(app);
-  cli::add_render(app);
-  cli::add_compare(app);
-  cli::add_certs(app);
-  const auto is_named = [argv](const CLI::App* command) { return command->check_name(argv[1]); };
-  if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_named).empty()) {
-    std::fprintf(stderr, "weft: there is no command '%s'; weft --help lists them\n", argv[1]);
-    return core::kExitWrongUse;
+  CLI::App app;
+  weft::cli::build_application(app);
+  if (argc > 1 && is_unknown_command(app, argv[1])) {
+    return weft::core::kExitWrongUse;
   }
   weft::security::set_up_grpc(weft::security::GrpcSays::kNothing);
-  return core::run_program(app, argc, argv, [] { return 0; });
+  return weft::core::run_program(
+      app, argc, argv, [] { return 0; }, weft::cli::known_names(app));
 }

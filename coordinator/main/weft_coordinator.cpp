@@ -74,6 +74,9 @@ std::unique_ptr<coordinator::Page> open_page(const Options& options,
 }
 
 int serve(const Options& options) {
+  if (options.state.empty()) {
+    throw CLI::RequiredError("--state");
+  }
   core::start_log(options.log_level);
   security::set_up_grpc(weft::security::GrpcSays::kToLog);
   const sigset_t signals = core::block_interrupts();
@@ -126,8 +129,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--state", options.state,
                  "folder of everything that must not be lost; made when absent, used by one "
-                 "coordinator at a time")
-      ->required();
+                 "coordinator at a time; required");
   security::add_security_options(app, options.listen);
   app.add_option("--lease", options.lease_seconds,
                  "seconds of silence after which a worker's shards go to another")
@@ -144,5 +146,9 @@ int main(int argc, char** argv) {
                  "HOST:PORT or unix:PATH of a weft-render that draws the page's swatches")
       ->option_text("ADDRESS");
   core::add_log_option(app, options.log_level);
+  app.footer(
+      "SIGTERM or Ctrl-C ends it; started again on the same state it goes on with its jobs, and "
+      "takes its workers back with what they compute.\n"
+      "Example: weft-coordinator --state /var/lib/weft --listen 127.0.0.1:7411");
   return core::run_program(app, argc, argv, [&] { return serve(options); });
 }

@@ -113,5 +113,9 @@ int main(int argc, char** argv) {
       "they name from a coordinator and keeps them between pictures."};
   core::set_program_name(app, "weft-render");
   add_options(app, options);
+  app.footer(
+      "SIGTERM: takes no more orders, finishes those it has and ends; a second one ends it at "
+      "once.\n"
+      "Example: weft-render --coordinator hub.example:7411 --tls-folder render-07");
   return core::run_program(app, argc, argv, [&] { return serve(options); });
 }

@@ -89,7 +89,7 @@ void declare(CLI::App& app, Flags& flags) {
       });
   app.add_option("--threads", flags.worker.threads, "Shards computed at the same time")
       ->check(CLI::Range(1U, weft::v1::kThreadsLimit))
-      ->capture_default_str();
+      ->default_str("all the machine has");
   app.add_option("--scratch", flags.worker.scratch,
                  "Folder for inputs that are used again and results until they are acknowledged; "
                  "may be shared between workers")
