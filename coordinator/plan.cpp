@@ -25,7 +25,7 @@ constexpr double kShadowBinMfp = 1.0 / 16;
 
 // Enters every shard's digest. Raised when a baker gives other bytes for the same spec and inputs,
 // so that results of the older program are not taken for the newer one's.
-constexpr std::uint64_t kResultsRevision = 3;
+constexpr std::uint64_t kResultsRevision = 4;
 
 // What the description's one seed is used for; the numbers are part of every result.
 enum class Purpose : std::uint32_t {

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/half.h"
+#include "shading/scattering_orders.h"
 #include "storage/database_fields.h"
 
 namespace weft::storage {
@@ -115,6 +116,33 @@ void check_cells(const FabricDatabase& db) {
           "/iirtf/standard_error", "an error is negative");
 }
 
+// Sizes are checked, because the extents that occur nowhere else bind whatever they find.
+void check_orders(const FabricDatabase& db, const Recolouring& orders) {
+  if (orders.order_light.empty() && orders.order_counts.empty() && orders.order_shapes.empty()) {
+    return;
+  }
+  constexpr const char* kLight = "/iirtf/order_light";
+  constexpr const char* kCounts = "/iirtf/order_counts";
+  constexpr const char* kShapes = "/iirtf/order_shapes";
+  const std::size_t materials = db.materials.size();
+  const std::size_t low = shading::shape_coefficients(db.sh_order);
+  const std::size_t rows =
+      db.cell_paths.size() * shading::order_groups(materials) * shading::kOrderBins * 3;
+  require(orders.order_light.size() == rows, kLight, "it does not fit cells and materials");
+  require(orders.order_counts.size() == rows * shading::order_counts(materials), kCounts,
+          "it does not fit cells and materials");
+  require(orders.order_shapes.size() == db.cell_paths.size() * shading::kOrderShapes * low * low,
+          kShapes, "it does not fit cells and harmonics");
+  const auto is_negative = [](std::uint16_t half) { return core::float_from_half(half) < 0; };
+  require_finite_halves(kLight, orders.order_light);
+  require_finite_halves(kCounts, orders.order_counts);
+  require_finite_halves(kShapes, orders.order_shapes);
+  require(std::none_of(orders.order_light.begin(), orders.order_light.end(), is_negative), kLight,
+          "light is negative");
+  require(std::none_of(orders.order_counts.begin(), orders.order_counts.end(), is_negative),
+          kCounts, "a count is negative");
+}
+
 void check_visibility(const FabricDatabase& db) {
   require_finite("/visibility/ssdf/mean", db.ssdf_mean);
   require_finite("/visibility/ssdf/basis", db.ssdf_basis);
@@ -136,6 +164,10 @@ void check_values(const FabricDatabase& database) {
   check_materials(database);
   check_cells(database);
   check_visibility(database);
+}
+
+void check_recolouring(const FabricDatabase& database, const Recolouring& recolouring) {
+  check_orders(database, recolouring);
 }
 
 }  // namespace weft::storage

@@ -33,6 +33,19 @@ class FieldReader {
     data = take<T>(spec, info_of(spec));
   }
 
+  template <class T>
+  void optional_array(const char* path, std::vector<T>& data) {
+    if (source_.has(path)) {
+      array(path, data);
+    }
+  }
+
+  void optional_text(const char* path, std::string& data) {
+    if (source_.has(path)) {
+      text(path, data);
+    }
+  }
+
   template <class Member>
   void columns(const char* path, std::vector<shading::FibreMaterial>& materials, Member member) {
     const DatasetSpec& spec = dataset_spec(path);
@@ -114,9 +127,15 @@ class FieldReader {
 }  // namespace
 
 FabricDatabase read_contents(DatasetSource& source) {
-  FabricDatabase database;
+  return std::move(read_all_contents(source).database);
+}
+
+RecolourableDatabase read_all_contents(DatasetSource& source) {
+  RecolourableDatabase contents;
+  FabricDatabase& database = contents.database;
   FieldReader reader(source);
   exchange_fields(reader, database);
+  exchange_recolouring(reader, contents.recolouring);
   const std::uint64_t bands = reader.extents().at("bands");
   if (bands > kMaxShOrder + 1 || bands * bands != reader.extents().at("coefficients")) {
     throw core::Error(core::Code::kDataLoss,
@@ -128,7 +147,8 @@ FabricDatabase read_contents(DatasetSource& source) {
   database.pca_components = static_cast<std::uint32_t>(reader.extents().at("components"));
   database.sg_count = static_cast<std::uint32_t>(reader.extents().at("sg_count"));
   check_values(database);
-  return database;
+  check_recolouring(database, contents.recolouring);
+  return contents;
 }
 
 }  // namespace weft::storage

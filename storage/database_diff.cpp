@@ -175,7 +175,9 @@ std::vector<DatasetDifference> diff_databases(const std::filesystem::path& from,
   const ClosedDatabase b(to);
   std::vector<DatasetDifference> differences;
   for (const DatasetSpec& spec : dataset_specs()) {
-    differences.push_back(compare(spec.path, a, b));
+    if (!spec.is_optional || a.info(spec.path) || b.info(spec.path)) {
+      differences.push_back(compare(spec.path, a, b));
+    }
   }
   return differences;
 }

@@ -2,6 +2,7 @@
 
 #include "storage/database_schema.h"
 #include "storage/fabric_database.h"
+#include "storage/recolouring.h"
 
 namespace weft::storage {
 
@@ -59,9 +60,21 @@ void exchange_fields(Io& io, Database& db) {
   io.text("/provenance/software", db.software);
 }
 
+// The same for the optional datasets, which come last.
+template <class Io, class Extra>
+void exchange_recolouring(Io& io, Extra& extra) {
+  io.optional_array("/iirtf/order_light", extra.order_light);
+  io.optional_array("/iirtf/order_counts", extra.order_counts);
+  io.optional_array("/iirtf/order_shapes", extra.order_shapes);
+  io.optional_text("/provenance/carried_over", extra.carried_over_json);
+}
+
 // Throws core::Error(kDataLoss) naming the dataset unless indices are in range, counts agree,
 // numbers are finite and quantities have the sign they must have. REQUIRES: the sizes of the arrays
 // agree with each other as the schema says.
 void check_values(const FabricDatabase& database);
+
+// The same for the optional datasets of a database whose values are right.
+void check_recolouring(const FabricDatabase& database, const Recolouring& recolouring);
 
 }  // namespace weft::storage

@@ -2,6 +2,7 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -15,6 +16,7 @@
 #include "storage/fabric_database.h"
 #include "storage/flat_database.h"
 #include "storage/h5_reader.h"
+#include "storage/recolouring.h"
 #include "storage/user_block.h"
 
 namespace weft::storage {
@@ -56,10 +58,10 @@ core::SandboxAnswer flattened(const core::InputFile& file, Flattened what) {
       limits_for(file.size_bytes()));
 }
 
-FabricDatabase read_checked(const core::InputFile& file) {
+RecolourableDatabase read_checked(const core::InputFile& file) {
   const core::SandboxAnswer answer = flattened(file, Flattened::kArrays);
   FlatDatabase source(answer.bytes(), Flattened::kArrays);
-  return read_contents(source);
+  return read_all_contents(source);
 }
 
 template <class Function>
@@ -78,6 +80,10 @@ auto naming_file(const std::string& name, Function function) {
 }  // namespace
 
 FabricDatabase read_database(const std::filesystem::path& path) {
+  return std::move(read_recolourable(path).database);
+}
+
+RecolourableDatabase read_recolourable(const std::filesystem::path& path) {
   return naming_file(path.string(), [&path] {
     const core::InputFile file(path);
     check_digest(file);
@@ -107,6 +113,9 @@ std::vector<StoredDataset> stored_datasets(const std::filesystem::path& path) {
     Extents extents;
     std::vector<StoredDataset> datasets;
     for (const DatasetSpec& spec : dataset_specs()) {
+      if (!source.has(spec.path)) {
+        continue;
+      }
       const DatasetSource::Info info = source.info(spec.path);
       extents.bind(spec, info.shape);
       datasets.push_back({spec.path, h5::to_string(info.element), info.shape, info.stored_bytes});
@@ -124,6 +133,9 @@ std::vector<StoredChunk> stored_chunks(const std::filesystem::path& path) {
     const std::uint64_t body_bytes = file.size_bytes() - kUserBlockBytes;
     std::vector<StoredChunk> chunks;
     for (const DatasetSpec& spec : dataset_specs()) {
+      if (!source.has(spec.path)) {
+        continue;
+      }
       for (const DatasetSource::Extent& extent : source.chunks(spec.path)) {
         if (extent.offset > body_bytes || extent.size_bytes > body_bytes - extent.offset) {
           throw core::Error(core::Code::kDataLoss, std::string("dataset ") + spec.path +

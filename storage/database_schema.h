@@ -18,6 +18,7 @@ struct DatasetSpec {
   const char* extents;
   bool compress;
   h5::Caption caption;
+  bool is_optional = false;  // older files do not have it
 };
 
 struct GroupSpec {

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/half.h"
+#include "shading/scattering_orders.h"
 #include "storage/database_fields.h"
 #include "storage/database_parser.h"
 #include "storage/h5.h"
@@ -64,6 +65,9 @@ Extents extents_of(const FabricDatabase& db) {
   extents.set("resolution", db.visibility_resolution);
   extents.set("components", db.pca_components);
   extents.set("sg_count", db.sg_count);
+  extents.set("order_groups", shading::order_groups(db.materials.size()));
+  extents.set("order_counts", shading::order_counts(db.materials.size()));
+  extents.set("low_coefficients", shading::shape_coefficients(db.sh_order));
   return extents;
 }
 
@@ -99,6 +103,19 @@ class FieldWriter {
   void array(const char* path, const std::vector<T>& data) {
     const DatasetSpec& spec = dataset_spec(path);
     add(spec, spec.element, std::span<const T>(data));
+  }
+
+  template <class T>
+  void optional_array(const char* path, const std::vector<T>& data) {
+    if (!data.empty()) {
+      array(path, data);
+    }
+  }
+
+  void optional_text(const char* path, const std::string& data) {
+    if (!data.empty()) {
+      text(path, data);
+    }
   }
 
   template <class Member>
@@ -235,11 +252,18 @@ class FileBeside {
 }  // namespace
 
 core::Digest write_database(const FabricDatabase& database, const std::filesystem::path& path) {
+  return write_database(database, {}, path);
+}
+
+core::Digest write_database(const FabricDatabase& database, const Recolouring& recolouring,
+                            const std::filesystem::path& path) {
   std::string file;
   {
     FieldWriter writer(database);
     exchange_fields(writer, database);
+    exchange_recolouring(writer, recolouring);
     check_values(database);
+    check_recolouring(database, recolouring);
     file = writer.finish();
   }
   UserBlock block;

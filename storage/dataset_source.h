@@ -37,6 +37,8 @@ class DatasetSource {
   DatasetSource(DatasetSource&&) = delete;
   DatasetSource& operator=(DatasetSource&&) = delete;
 
+  // Whether there is anything of that name; all but optional datasets may be asked for without.
+  [[nodiscard]] virtual bool has(const std::string& path) = 0;
   [[nodiscard]] virtual Info info(const std::string& path) = 0;
   // The dataset's stored chunks, kChunksLimit at most.
   [[nodiscard]] virtual std::vector<Extent> chunks(const std::string& path) = 0;

@@ -87,6 +87,13 @@ void flatten_database(DatasetSource& source, Flattened what, core::FlatWriter& o
   Extents extents;
   std::vector<std::byte> data;
   for (const DatasetSpec& spec : dataset_specs()) {
+    if (spec.is_optional) {
+      const bool is_there = source.has(spec.path);
+      out.number(is_there ? 1 : 0);
+      if (!is_there) {
+        continue;
+      }
+    }
     const DatasetSource::Info info = source.info(spec.path);
     extents.bind(spec, info.shape);
     source.admit(spec.path, info);
@@ -115,6 +122,9 @@ void flatten_database(DatasetSource& source, Flattened what, core::FlatWriter& o
 FlatDatabase::FlatDatabase(std::span<const std::byte> data, Flattened what) {
   core::FlatReader in(data);
   for (const DatasetSpec& spec : dataset_specs()) {
+    if (spec.is_optional && in.number() == 0) {
+      continue;
+    }
     Entry entry;
     entry.info = read_info(in, spec.path);
     if (what == Flattened::kArrays) {
@@ -135,6 +145,8 @@ const FlatDatabase::Entry& FlatDatabase::entry(const std::string& path) const {
   CHECK(found != entries_.end());
   return found->second;
 }
+
+bool FlatDatabase::has(const std::string& path) { return entries_.contains(path); }
 
 DatasetSource::Info FlatDatabase::info(const std::string& path) { return entry(path).info; }
 

@@ -30,6 +30,7 @@ class FlatDatabase : public DatasetSource {
   // REQUIRES: `data` outlives the object. Throws core::Error(kDataLoss) when it is not whole.
   FlatDatabase(std::span<const std::byte> data, Flattened what);
 
+  [[nodiscard]] bool has(const std::string& path) override;
   [[nodiscard]] Info info(const std::string& path) override;
   // REQUIRES: made of shapes.
   [[nodiscard]] std::vector<Extent> chunks(const std::string& path) override;

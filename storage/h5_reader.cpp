@@ -160,6 +160,17 @@ Handle Reader::open(const std::string& path) const {
   return object;
 }
 
+bool Reader::has(const std::string& path) {
+  for (std::size_t end = path.find('/', 1);; end = path.find('/', end + 1)) {
+    if (H5Lexists(file_.id(), path.substr(0, end).c_str(), H5P_DEFAULT) <= 0) {
+      return false;
+    }
+    if (end == std::string::npos) {
+      return true;
+    }
+  }
+}
+
 Reader::Info Reader::info(const std::string& path) {
   const Handle dataset = open(path);
   check_header(path);

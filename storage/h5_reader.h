@@ -35,6 +35,7 @@ class Reader : public DatasetSource {
   // Throws unless every object in the file is one of these, reached by hard links alone.
   void require_only(const std::set<std::string>& groups, const std::set<std::string>& datasets);
 
+  [[nodiscard]] bool has(const std::string& path) override;
   [[nodiscard]] Info info(const std::string& path) override;
   [[nodiscard]] std::vector<Extent> chunks(const std::string& path) override;
   void admit(const std::string& path, const Info& info) override;

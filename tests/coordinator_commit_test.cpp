@@ -216,7 +216,8 @@ TEST_F(CommitTest, Merge_GivesTheSameSumsHoweverACellIsCut) {
                                                 paths_per_shard)));
     }
     transfer.shards = results.of(StageName::kTransfer).shards;
-    fold_transfer(transfer, results.reader(), db);
+    storage::Recolouring recolouring;
+    fold_transfer(transfer, results.reader(), db, recolouring);
     return db;
   };
   const storage::FabricDatabase whole = folded(10'000);
@@ -241,7 +242,8 @@ storage::FabricDatabase folded_to_error(double target, std::uint64_t paths) {
   spec.set_target_standard_error(target);
   storage::FabricDatabase db;
   db.cell_coordinates = {0, 0, 0, 1, 0, 0};
-  fold_transfer(transfer, results.reader(), db);
+  storage::Recolouring recolouring;
+  fold_transfer(transfer, results.reader(), db, recolouring);
   return db;
 }
 

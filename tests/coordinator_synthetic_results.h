@@ -15,6 +15,7 @@
 #include "core/random.h"
 #include "fabric/tile.h"
 #include "proto/arrays.h"
+#include "shading/scattering_orders.h"
 
 // A job of made-up results: each number tells where it stands.
 namespace weft::coordinator::test {
@@ -147,6 +148,18 @@ inline v1::Arrays transfer_result(std::uint64_t cell, std::uint64_t first, std::
   add<std::uint64_t>(arrays, "paths", {1}, {count});
   add(arrays, "sum", {3, kEntries, kEntries}, sum);
   add(arrays, "sum_of_squares", {3, kEntries, kEntries}, squares);
+  // All of the light was scattered once, half of it by C_R.
+  std::vector<std::int64_t> numbers(std::size_t{shading::kOrderBins} * 3 * 4);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::int64_t light = core::to_fixed_point(static_cast<double>(count));
+    numbers[4 * c] = light;
+    numbers[4 * c + 1] = light;
+    numbers[4 * c + 2] = light / 2;
+    numbers[4 * c + 3] = light / 2;
+  }
+  add(arrays, "order_numbers", {1, shading::kOrderBins, 3, 4}, numbers);
+  add(arrays, "order_shapes", {shading::kOrderShapes, kEntries, kEntries},
+      std::vector<std::int64_t>(shading::kOrderShapes * kEntries * kEntries));
   return arrays;
 }
 

@@ -116,6 +116,7 @@ TEST_F(DamageTest, DatasetsHaveChecksumsOfTheirOwn) {
 }
 
 TEST_F(DamageTest, H5pyReadsEverythingWithoutDocumentation) {
+  write_database(small_database(), small_recolouring(), whole_);
   const std::optional<std::string> output = run_h5py(whole_.string());
   if (!output) {
     GTEST_SKIP() << "/usr/bin/python3 has no h5py";

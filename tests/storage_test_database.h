@@ -4,7 +4,9 @@
 
 #include "core/half.h"
 #include "core/random.h"
+#include "shading/scattering_orders.h"
 #include "storage/fabric_database.h"
+#include "storage/recolouring.h"
 
 namespace weft::storage {
 
@@ -70,6 +72,24 @@ inline FabricDatabase small_database() {
   db.stages_json = R"({"stages": []})";
   db.software = "weft, schema 1";
   return db;
+}
+
+// All optional datasets of the small database.
+inline Recolouring small_recolouring() {
+  const FabricDatabase db = small_database();
+  const std::size_t rows =
+      db.cell_paths.size() * shading::order_groups(db.materials.size()) * shading::kOrderBins * 3;
+  Recolouring recolouring;
+  for (std::size_t i = 0; i < rows; ++i) {
+    recolouring.order_light.push_back(core::half_from_float(1 / static_cast<float>(i + 1)));
+  }
+  recolouring.order_counts.assign(rows * shading::order_counts(db.materials.size()),
+                                  core::half_from_float(1.5F));
+  const std::size_t low = shading::shape_coefficients(db.sh_order);
+  recolouring.order_shapes.assign(db.cell_paths.size() * shading::kOrderShapes * low * low,
+                                  core::half_from_float(-0.25F));
+  recolouring.carried_over_json = R"({"base": "small@1"})";
+  return recolouring;
 }
 
 }  // namespace weft::storage

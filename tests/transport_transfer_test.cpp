@@ -329,20 +329,22 @@ TEST(TransportTransfer, AnySplitAtWholeChunks_GivesTheSameBytes) {
     settings.estimator = estimator;
     settings.seed = 12;
     const TransferSums whole = transfer_sums(scene, materials, {3, &segments, 0, 1124}, settings);
-    std::vector<std::int64_t> sum(whole.sum.size());
-    std::vector<std::int64_t> squares(whole.sum.size());
+    TransferSums parts{0, std::vector<std::int64_t>(whole.sum.size()),
+                       std::vector<std::int64_t>(whole.sum.size()),
+                       std::vector<std::int64_t>(whole.order_numbers.size()),
+                       std::vector<std::int64_t>(whole.order_shapes.size())};
     for (const auto& [first, count] : {std::pair{0, 256}, {256, 512}, {768, 356}}) {
       const TransferSums part = transfer_sums(
           scene, materials,
           {3, &segments, static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(count)},
           settings);
-      for (std::size_t i = 0; i < sum.size(); ++i) {
-        sum[i] += part.sum[i];
-        squares[i] += part.sum_of_squares[i];
-      }
+      add_sums(part, parts);
     }
-    EXPECT_EQ(sum, whole.sum);
-    EXPECT_EQ(squares, whole.sum_of_squares);
+    EXPECT_EQ(parts.paths, whole.paths);
+    EXPECT_EQ(parts.sum, whole.sum);
+    EXPECT_EQ(parts.sum_of_squares, whole.sum_of_squares);
+    EXPECT_EQ(parts.order_numbers, whole.order_numbers);
+    EXPECT_EQ(parts.order_shapes, whole.order_shapes);
     // Another cell, or another seed, has other paths.
     EXPECT_NE(transfer_sums(scene, materials, {4, &segments, 0, 1124}, settings).sum, whole.sum);
   }

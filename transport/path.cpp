@@ -1,6 +1,7 @@
 #include "transport/path.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <glm/geometric.hpp>
@@ -50,9 +51,28 @@ bool Path::advance() {
   const fabric::Segment segment = tile.segment(hit->segment);
   frame_ = shading::fibre_frame(glm::normalize(segment.b_mm - segment.a_mm), -direction_);
   omega_o_ = frame_ * -direction_;
-  bcsdf_ = &materials_[tile.strands[tile.segment_strand[hit->segment]].material];
+  material_ = tile.strands[tile.segment_strand[hit->segment]].material;
+  bcsdf_ = &materials_[material_];
   ++vertices_;
   return true;
+}
+
+void Path::count(bool reflects, glm::vec3 omega_i) {
+  if (material_ >= counts_.of.size()) {
+    return;
+  }
+  PathCounts::Material& of = counts_.of[material_];
+  if (!reflects) {
+    ++of.transmissions;
+    return;
+  }
+  ++of.reflections;
+  const float cos_theta = std::sqrt(omega_i.y * omega_i.y + omega_i.z * omega_i.z);
+  const float grazing = shading::schlick_weight(cos_theta);
+  const glm::vec3 coloured = bcsdf_->material().c_r * (1 - grazing);
+  for (int c = 0; c < 3; ++c) {
+    of.coloured[c] += coloured[c] > 0 ? coloured[c] / (coloured[c] + grazing) : 0;
+  }
 }
 
 bool Path::go_on(const shading::LobeOdds& odds, glm::vec3 u) {
@@ -60,6 +80,7 @@ bool Path::go_on(const shading::LobeOdds& odds, glm::vec3 u) {
   if (step.survives) {
     direction_ = glm::normalize(glm::transpose(frame_) * step.omega_i);
     throughput_ = step.throughput;
+    count(u.x < odds.r, step.omega_i);
   }
   return step.survives;
 }

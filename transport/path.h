@@ -11,6 +11,7 @@
 
 #include "core/random.h"
 #include "shading/fibre_bcsdf.h"
+#include "transport/path_counts.h"
 #include "transport/scene.h"
 
 namespace weft::transport {
@@ -48,6 +49,8 @@ class Path {
   [[nodiscard]] glm::vec3 direction() const { return direction_; }
   [[nodiscard]] glm::vec3 throughput() const { return throughput_; }
   [[nodiscard]] std::uint32_t vertices() const { return vertices_; }
+  // Of the scatterings so far.
+  [[nodiscard]] const PathCounts& counts() const { return counts_; }
   // Across and along the cloth, from the start to the last fibre met; and the height of where that
   // was met, before the first one of the start.
   [[nodiscard]] glm::dvec2 travelled_mm() const { return travelled_mm_; }
@@ -55,6 +58,7 @@ class Path {
 
  private:
   bool go_on(const shading::LobeOdds& odds, glm::vec3 u);
+  void count(bool reflects, glm::vec3 omega_i);
 
   const Scene& scene_;
   std::span<const shading::FibreBcsdf> materials_;
@@ -67,6 +71,8 @@ class Path {
   glm::mat3 frame_{1};  // of the fibre just met
   glm::vec3 omega_o_{0, 0, 0};
   const shading::FibreBcsdf* bcsdf_ = nullptr;
+  std::uint32_t material_ = 0;  // of the fibre just met
+  PathCounts counts_;
 };
 
 }  // namespace weft::transport

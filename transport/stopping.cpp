@@ -14,14 +14,6 @@ namespace {
 static_assert(core::kStoppingBlockPaths % kTransferChunkPaths == 0);
 static_assert(core::kStoppingBlockPaths * ShChunk::kLargestSum < kTransferChunkPaths * 0x1p28);
 
-void add(const TransferSums& block, TransferSums& sums) {
-  sums.paths += block.paths;
-  for (std::size_t i = 0; i < sums.sum.size(); ++i) {
-    sums.sum[i] += block.sum[i];
-    sums.sum_of_squares[i] += block.sum_of_squares[i];
-  }
-}
-
 }  // namespace
 
 TransferSums transfer_sums_to_error(const Scene& scene,
@@ -39,7 +31,7 @@ TransferSums transfer_sums_to_error(const Scene& scene,
   while (!core::ends_at(rule, {sums.sum, sums.sum_of_squares, sums.paths})) {
     block.first = sums.paths;
     block.count = std::min(core::kStoppingBlockPaths, paths.count - sums.paths);
-    add(transfer_sums(scene, materials, block, settings, checkpoint), sums);
+    add_sums(transfer_sums(scene, materials, block, settings, checkpoint), sums);
   }
   return sums;
 }

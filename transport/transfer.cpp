@@ -1,12 +1,15 @@
 #include "transport/transfer.h"
 
 #include <algorithm>
+#include <functional>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "core/check.h"
 #include "core/random.h"
 #include "core/sobol.h"
+#include "transport/order_chunk.h"
 #include "transport/path.h"
 #include "transport/sh_chunk.h"
 #include "transport/sphere.h"
@@ -26,6 +29,8 @@ constexpr float kWorthOfHeight = 2;
 struct Workspace {
   std::vector<Path> pending;        // parts of the path that have yet to be followed
   std::vector<LightSample> lights;  // that it found
+  bool wants_orders = false;
+  std::vector<OrderedLight> ordered;  // the same, but for light that came directly
 };
 
 // Worth of a path at a height over that of its start.
@@ -75,6 +80,9 @@ void find_exits(const Path& start, glm::vec3 first, const TransferSettings& sett
     if (alive && (path.vertices() > 0 || settings.with_direct) &&
         (settings.lights_below || path.direction().z > 0)) {
       work.lights.push_back({4 * kPi * path.throughput(), path.direction()});
+      if (work.wants_orders && path.vertices() > 0) {
+        work.ordered.push_back({work.lights.back(), path.counts(), path.vertices()});
+      }
     }
   }
 }
@@ -98,6 +106,14 @@ void connect_light(Path path, const TransferSettings& settings, core::Random& ra
   }
 }
 
+// Light by orders, where it is counted.
+std::optional<OrderChunk> order_chunk(const TransferSettings& settings, std::size_t materials) {
+  const bool is_counted =
+      settings.estimator == Estimator::kExit && materials <= shading::kMostCountedMaterials;
+  return is_counted ? std::optional<OrderChunk>(std::in_place, settings.sh_order, materials)
+                    : std::nullopt;
+}
+
 // In [0, 1), 24 bits, as core::Random::uniform().
 float unit(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
 
@@ -116,9 +132,16 @@ TransferSums transfer_sums(const Scene& scene, std::span<const shading::FibreBcs
   sums.paths = paths.count;
   sums.sum.assign(chunk.size(), 0);
   sums.sum_of_squares.assign(chunk.size(), 0);
+  std::optional<OrderChunk> orders = order_chunk(settings, materials.size());
+  work.wants_orders = orders.has_value();
+  if (orders) {
+    sums.order_numbers.assign(orders->numbers(), 0);
+    sums.order_shapes.assign(orders->shape_entries(), 0);
+  }
   for (std::uint64_t i = paths.first; i < paths.first + paths.count; ++i) {
     core::Random random(settings.seed, paths.cell, i);
     work.lights.clear();
+    work.ordered.clear();
     glm::vec3 arrival;
     if (settings.estimator == Estimator::kExit) {
       const core::SobolPoints::Point u = points.point(static_cast<std::uint32_t>(i));
@@ -133,12 +156,30 @@ TransferSums transfer_sums(const Scene& scene, std::span<const shading::FibreBcs
       connect_light(Path(scene, materials, segment, arrival), settings, random, work);
     }
     chunk.add(arrival, work.lights);
+    if (orders) {
+      orders->add(arrival, work.ordered);
+    }
     if ((i + 1) % kTransferChunkPaths == 0 || i + 1 == paths.first + paths.count) {
       chunk.flush(sums.sum, sums.sum_of_squares);
+      if (orders) {
+        orders->flush(sums.order_numbers, sums.order_shapes);
+      }
       pass(checkpoint);
     }
   }
   return sums;
+}
+
+void add_sums(const TransferSums& more, TransferSums& sums) {
+  const auto add = [](const std::vector<std::int64_t>& from, std::vector<std::int64_t>& to) {
+    CHECK_EQ(from.size(), to.size());
+    std::transform(from.begin(), from.end(), to.begin(), to.begin(), std::plus<>());
+  };
+  sums.paths += more.paths;
+  add(more.sum, sums.sum);
+  add(more.sum_of_squares, sums.sum_of_squares);
+  add(more.order_numbers, sums.order_numbers);
+  add(more.order_shapes, sums.order_shapes);
 }
 
 }  // namespace weft::transport

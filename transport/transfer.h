@@ -57,7 +57,14 @@ struct TransferSums {
   std::uint64_t paths = 0;
   std::vector<std::int64_t> sum;
   std::vector<std::int64_t> sum_of_squares;
+  // Light by orders of scattering (transport/order_chunk.h); empty by the paper's estimator, and of
+  // cloth of more materials than are counted.
+  std::vector<std::int64_t> order_numbers;
+  std::vector<std::int64_t> order_shapes;
 };
+
+// Adds sums over further paths of the same cell, by the same settings.
+void add_sums(const TransferSums& more, TransferSums& sums);
 
 [[nodiscard]] TransferSums transfer_sums(const Scene& scene,
                                          std::span<const shading::FibreBcsdf> materials,

@@ -7,6 +7,7 @@
 #include "core/stopping.h"
 #include "proto/arrays.h"
 #include "shading/fibre_bcsdf.h"
+#include "shading/scattering_orders.h"
 #include "transport/stopping.h"
 #include "transport/transfer.h"
 #include "worker/bakers.h"
@@ -74,6 +75,16 @@ class TransferBaker : public Baker {
     v1::add_array<std::uint64_t>(arrays, "paths", {1}, count);
     v1::add_array<std::int64_t>(arrays, "sum", {3, j, j}, sums.sum);
     v1::add_array<std::int64_t>(arrays, "sum_of_squares", {3, j, j}, sums.sum_of_squares);
+    if (!sums.order_numbers.empty()) {
+      const std::uint64_t materials = materials_.size();
+      const std::uint64_t low = shading::shape_coefficients(spec_.sh_order());
+      v1::add_array<std::int64_t>(arrays, "order_numbers",
+                                  {shading::order_groups(materials), shading::kOrderBins, 3,
+                                   1 + shading::order_counts(materials)},
+                                  sums.order_numbers);
+      v1::add_array<std::int64_t>(arrays, "order_shapes", {shading::kOrderShapes, low, low},
+                                  sums.order_shapes);
+    }
     return v1::serialize(arrays);
   }
 

@@ -55,7 +55,8 @@ shading::FibreMaterial fibre_material(const v1::Material& material) {
 // Folds a stage into `database`. Stages come in an order in which they can be planned, so those
 // that this one needs are folded.
 void fold(const FinishedStage& finished, const v1::FabricDescription& description,
-          const ReadBlob& read_blob, storage::FabricDatabase& database, double& shadow_fit_error) {
+          const ReadBlob& read_blob, storage::RecolourableDatabase& all, double& shadow_fit_error) {
+  storage::FabricDatabase& database = all.database;
   switch (finished.stage.name) {
     case StageName::kGeometry:
       return fold_geometry(finished, read_blob, database);
@@ -72,7 +73,7 @@ void fold(const FinishedStage& finished, const v1::FabricDescription& descriptio
       for (const v1::Material& material : finished.stage.spec.transfer().materials()) {
         database.materials.push_back(fibre_material(material));
       }
-      return fold_transfer(finished, read_blob, database);
+      return fold_transfer(finished, read_blob, database, all.recolouring);
     case StageName::kShadow:
       shadow_fit_error = fold_shadow(finished, read_blob, database);
       return;
@@ -118,7 +119,8 @@ core::Digest commit(const v1::FabricDescription& description,
                     const std::function<std::string(const core::Digest&)>& read_blob,
                     const std::filesystem::path& path) {
   // The job is planned again, stage by stage: what is merged is what the plan says.
-  storage::FabricDatabase database;
+  storage::RecolourableDatabase all;
+  storage::FabricDatabase& database = all.database;
   double shadow_fit_error = 0;
   std::vector<FinishedStage> stages;
   std::vector<StageResults> finished;
@@ -126,7 +128,7 @@ core::Digest commit(const v1::FabricDescription& description,
        planned = plan(description, finished, read_blob)) {
     for (Stage& stage : planned) {
       stages.push_back(take_results(std::move(stage), results));
-      fold(stages.back(), description, read_blob, database, shadow_fit_error);
+      fold(stages.back(), description, read_blob, all, shadow_fit_error);
       finished.push_back({stages.back().stage.name, stages.back().shards});
     }
   }
@@ -134,7 +136,7 @@ core::Digest commit(const v1::FabricDescription& description,
   database.description_json = json_of(description);
   database.stages_json = stages_json(stages, shadow_fit_error);
   database.software = kSoftware;
-  return storage::write_database(database, path);
+  return storage::write_database(database, all.recolouring, path);
 }
 
 }  // namespace weft::coordinator

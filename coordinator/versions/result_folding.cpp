@@ -5,10 +5,12 @@
 #include <type_traits>
 
 #include "core/error.h"
+#include "core/half.h"
 #include "core/moments.h"
 #include "core/stopping.h"
 #include "fabric/tile.h"
 #include "proto/arrays.h"
+#include "shading/scattering_orders.h"
 #include "shading/shadow_fit.h"
 
 namespace weft::coordinator {
@@ -117,7 +119,65 @@ struct CellSums {
   std::uint64_t paths = 0;
   std::vector<WideSum> sum;
   std::vector<WideSum> sum_of_squares;
+  std::vector<WideSum> order_numbers;
+  std::vector<WideSum> order_shapes;
 };
+
+void add_to(std::vector<WideSum>& sums, const std::vector<std::int64_t>& more) {
+  sums.resize(more.size(), 0);
+  for (std::size_t i = 0; i < more.size(); ++i) {
+    sums[i] += more[i];
+  }
+}
+
+// Whether the results of this stage tell orders of scattering apart.
+bool has_orders(const v1::TransferSpec& spec) {
+  const auto materials = static_cast<std::size_t>(spec.materials_size());
+  return spec.estimator() == v1::TRANSFER_ESTIMATOR_EXIT && materials >= 1 &&
+         materials <= shading::kMostCountedMaterials;
+}
+
+void add_orders(const ShardResult& result, const v1::TransferSpec& spec, CellSums& cell) {
+  const auto materials = static_cast<std::size_t>(spec.materials_size());
+  const std::uint64_t low = shading::shape_coefficients(spec.sh_order());
+  const auto numbers = result.array<std::int64_t>(
+      "order_numbers", {shading::order_groups(materials), shading::kOrderBins, 3,
+                        1 + shading::order_counts(materials)});
+  result.require(std::all_of(numbers.begin(), numbers.end(), [](auto n) { return n >= 0; }),
+                 "light or a count of its scatterings is negative");
+  add_to(cell.order_numbers, numbers);
+  add_to(cell.order_shapes,
+         result.array<std::int64_t>("order_shapes", {shading::kOrderShapes, low, low}));
+}
+
+std::uint16_t half_of(double value) {
+  constexpr double kLargestHalf = 65504;
+  return core::half_from_float(static_cast<float>(std::clamp(value, -kLargestHalf, kLargestHalf)));
+}
+
+double mean_of(WideSum sum, std::uint64_t paths) {
+  return paths == 0
+             ? 0
+             : static_cast<double>(sum) / core::kFixedPointScale / static_cast<double>(paths);
+}
+
+// Light, mean counts of it and shapes of one cell.
+void fold_orders(const CellSums& cell, std::size_t materials, storage::Recolouring& recolouring) {
+  const std::size_t width = 1 + shading::order_counts(materials);
+  for (std::size_t row = 0; row < cell.order_numbers.size(); row += width) {
+    const WideSum light = cell.order_numbers[row];
+    recolouring.order_light.push_back(half_of(mean_of(light, cell.paths)));
+    for (std::size_t k = 1; k < width; ++k) {
+      const double count =
+          light > 0 ? static_cast<double>(cell.order_numbers[row + k]) / static_cast<double>(light)
+                    : 0;
+      recolouring.order_counts.push_back(half_of(count));
+    }
+  }
+  for (const WideSum sum : cell.order_shapes) {
+    recolouring.order_shapes.push_back(half_of(mean_of(sum, cell.paths)));
+  }
+}
 
 void add_shard(const FinishedStage& transfer, std::uint64_t shard, const ReadBlob& read_blob,
                CellSums& cell) {
@@ -137,9 +197,10 @@ void add_shard(const FinishedStage& transfer, std::uint64_t shard, const ReadBlo
                    "its paths end where the target standard error lets none end");
   }
   cell.paths += paths[0];
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    cell.sum[i] += sum[i];
-    cell.sum_of_squares[i] += sum_of_squares[i];
+  add_to(cell.sum, sum);
+  add_to(cell.sum_of_squares, sum_of_squares);
+  if (has_orders(spec)) {
+    add_orders(result, spec, cell);
   }
 }
 
@@ -280,7 +341,7 @@ double fold_shadow(const FinishedStage& shadow, const ReadBlob& read_blob,
 }
 
 void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,
-                   storage::FabricDatabase& database) {
+                   storage::FabricDatabase& database, storage::Recolouring& recolouring) {
   const v1::TransferSpec& spec = transfer.stage.spec.transfer();
   const std::uint64_t n = std::uint64_t{spec.sh_order() + 1} * (spec.sh_order() + 1);
   const std::uint64_t cells = database.cell_coordinates.size() / 3;
@@ -290,8 +351,6 @@ void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,
   database.transfer_se.reserve(cells * 3 * n * n);
   for (std::uint64_t cell = 0; cell < cells; ++cell) {
     CellSums sums;
-    sums.sum.assign(3 * n * n, 0);
-    sums.sum_of_squares.assign(3 * n * n, 0);
     for (std::uint64_t block = 0; block < blocks; ++block) {
       add_shard(transfer, cell * blocks + block, read_blob, sums);
     }
@@ -304,6 +363,7 @@ void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,
                             " were planned; delete them and compute them again");
     }
     database.cell_paths.push_back(sums.paths);
+    fold_orders(sums, static_cast<std::size_t>(spec.materials_size()), recolouring);
     for (std::size_t i = 0; i < sums.sum.size(); ++i) {
       const core::MeanAndError moments =
           core::mean_and_error(static_cast<double>(sums.sum[i]) / core::kFixedPointScale,

@@ -7,6 +7,7 @@
 #include "coordinator/plan.h"
 #include "core/digest.h"
 #include "storage/fabric_database.h"
+#include "storage/recolouring.h"
 
 namespace weft::coordinator {
 
@@ -41,6 +42,6 @@ double fold_shadow(const FinishedStage& shadow, const ReadBlob& read_blob,
                    storage::FabricDatabase& database);
 // REQUIRES: the grid is folded.
 void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,
-                   storage::FabricDatabase& database);
+                   storage::FabricDatabase& database, storage::Recolouring& recolouring);
 
 }  // namespace weft::coordinator
