@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/recolor.h"
 #include "core/program.h"
 
 namespace weft::cli {
@@ -21,7 +22,7 @@ struct Group {
 const std::vector<Group>& groups() {
   static const std::vector<Group> all{
       {"Describe a fabric", {add_new, add_import, add_preview, add_export}},
-      {"Precompute it", {add_run, add_submit, add_up}},
+      {"Precompute it", {add_run, add_submit, add_recolor, add_up}},
       {"Follow and steer jobs",
        {add_jobs, add_watch, add_explain, add_logs, add_pause, add_resume, add_priority, add_cancel,
         add_retry}},

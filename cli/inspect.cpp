@@ -11,11 +11,13 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/add_command.h"
+#include "cli/carried_over.h"
 #include "cli/commands.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
 #include "storage/database_summary.h"
 #include "storage/fabric_database.h"
+#include "storage/recolouring.h"
 
 namespace weft::cli {
 
@@ -67,6 +69,19 @@ std::string name_in(const Json& description) {
   return has_name ? description["name"].get<std::string>() : "";
 }
 
+// Null where light was traced in the colours that the file has.
+Json carried_over_of(const storage::Recolouring& recolouring) {
+  if (recolouring.carried_over_json.empty()) {
+    return nullptr;
+  }
+  const CarriedOver carried = parse_carried_over(recolouring.carried_over_json);
+  return {{"base", carried.base},
+          {"base_digest", carried.base_digest},
+          {"light_error", carried.light_error},
+          {"light_error_noise", carried.light_error_noise},
+          {"matrix_error", carried.matrix_error}};
+}
+
 Json sizes_of(const storage::FabricDatabase& db, const std::filesystem::path& path) {
   const std::vector<storage::StoredDataset> datasets = storage::stored_datasets(path);
   Json sections = Json::array();
@@ -91,7 +106,8 @@ Json sizes_of(const storage::FabricDatabase& db, const std::filesystem::path& pa
 }
 
 Json summary_of(const std::filesystem::path& path) {
-  const storage::FabricDatabase db = storage::read_database(path);
+  const storage::RecolourableDatabase all = storage::read_recolourable(path);
+  const storage::FabricDatabase& db = all.database;
   const storage::DatabaseErrors errors = storage::database_errors(db);
   const Json description = parsed_or_text(db.description_json);
   const Json stages = parsed_or_text(db.stages_json);
@@ -117,6 +133,8 @@ Json summary_of(const std::filesystem::path& path) {
   json["cells_per_axis"] = {db.cells_per_axis.x, db.cells_per_axis.y, db.cells_per_axis.z};
   json["sh_order"] = db.sh_order;
   json["paths_per_cell"] = {{"fewest", errors.fewest_paths}, {"most", errors.most_paths}};
+  json["carried_over"] = carried_over_of(all.recolouring);
+  json["can_be_recolored"] = all.recolouring.has_orders();
   json["transfer_rms"] = errors.transfer_rms;
   json["transfer_standard_error_rms"] = errors.standard_error_rms;
   json["transfer_relative_error"] =
@@ -182,6 +200,14 @@ void print_summary(const Json& json) {
                               number(json["sh_order"]), number(json["paths_per_cell"]["fewest"]),
                               number(json["paths_per_cell"]["most"]),
                               100 * number(json["transfer_relative_error"])));
+  if (const Json& carried = json["carried_over"]; !carried.is_null()) {
+    print_line("carried over", "from " + carried["base"].get<std::string>() + ", content " +
+                                   carried["base_digest"].get<std::string>().substr(0, 12) +
+                                   text("; light off by %.2g %% (+- %.2g %%), matrices by %.2g %%",
+                                        100 * number(carried["light_error"]),
+                                        100 * number(carried["light_error_noise"]),
+                                        100 * number(carried["matrix_error"])));
+  }
   const double resolution = number(json["visibility_resolution"]);
   print_line("visibility", text("%.0f x %.0f directions; %.3g %% of the sphere is open, %.3g %% of "
                                 "the segments see no sky",

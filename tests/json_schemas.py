@@ -111,6 +111,7 @@ def check_files(outputs, tiny):
     check("estimate", "run", tiny, "--dry-run")
     check("run", "run", tiny, "-o", "tiny.h5", "--quality", "preview")
     check("inspect", "inspect", "tiny.h5")
+    check("recolor", "recolor", "tiny.h5", "--yarn", "all=#7a1f2b", "-o", "claret.h5")
     check("verify", "verify", "tiny.h5")
     (outputs.folder / "damaged.h5").write_bytes(b"x" * 4096)
     check("verify", "verify", "damaged.h5", codes=(1,))

@@ -131,10 +131,11 @@ class OrderedLight {
   std::size_t first_row_;
 };
 
-// One channel of the new colours, as a channel of the old ones with these gains.
+// A channel of the new colours, as a channel of the old ones with these gains.
 struct Source {
   int channel = 0;
   Gains gains;
+  double weight = 1;  // beside other sources of the same channel
 };
 
 std::size_t cells_of(const Fabric& fabric) { return fabric.database.cell_paths.size(); }
@@ -150,30 +151,42 @@ double effort_of(const Fabric& fabric, const Source& source) {
   return sums.after > 0 ? sums.effort / sums.after : 0;
 }
 
-Source nearest_source(const Fabric& fabric, const std::vector<FibreMaterial>& materials,
-                      int channel) {
-  std::optional<Source> best;
+// The old channels that a new one is taken over from: the less they must change, the more they
+// count, so that a small step of a colour is never a jump of its light.
+std::vector<Source> sources_of(const Fabric& fabric, const std::vector<FibreMaterial>& materials,
+                               int channel) {
+  constexpr double kPower = 4;
+  std::vector<Source> sources;
   double least = std::numeric_limits<double>::infinity();
   for (const int candidate : {channel, (channel + 1) % 3, (channel + 2) % 3}) {
     const std::optional<Gains> gains =
         gains_between(fabric.database.materials, candidate, materials, channel);
-    if (!gains) {
-      continue;
-    }
-    Source source{candidate, *gains};
-    const double effort = effort_of(fabric, source);
-    if (!best || effort < least) {
-      least = effort;
-      best = std::move(source);
+    if (gains) {
+      Source source{candidate, *gains, 1};
+      source.weight = effort_of(fabric, source);
+      if (source.weight == 0) {
+        source.weight = 1;
+        return {source};
+      }
+      least = std::min(least, source.weight);
+      sources.push_back(std::move(source));
     }
   }
-  if (!best) {
+  if (sources.empty()) {
     throw core::Error(core::Code::kFailedPrecondition,
                       "the fabric was traced with colours of which a channel is exactly 0, and "
                       "nothing follows from them for brighter ones; trace the new colours "
                       "(--exact)");
   }
-  return *best;
+  double sum = 0;
+  for (Source& source : sources) {
+    source.weight = std::pow(least / source.weight, kPower);
+    sum += source.weight;
+  }
+  for (Source& source : sources) {
+    source.weight /= sum;
+  }
+  return sources;
 }
 
 // Matrices of one cell in the new colours. [3, n, n] each.
@@ -230,12 +243,13 @@ void recolour_cell(const Fabric& fabric, std::size_t cell, const Source& source,
   const std::size_t from = static_cast<std::size_t>(source.channel) * entries;
   const std::size_t to = static_cast<std::size_t>(channel) * entries;
   for (std::size_t i = 0; i < entries; ++i) {
-    at.new_transfer[to + i] = static_cast<float>(gains.once) * at.transfer[from + i];
-    at.new_error[to + i] = static_cast<float>(gains.all) * at.error[from + i];
+    at.new_transfer[to + i] +=
+        static_cast<float>(source.weight * gains.once) * at.transfer[from + i];
+    at.new_error[to + i] += static_cast<float>(source.weight * gains.all) * at.error[from + i];
   }
   const std::size_t low = shading::shape_coefficients(fabric.database.sh_order);
   for (std::size_t k = 0; k < shading::kOrderShapes; ++k) {
-    const double share = (gains.of[k] - gains.once) * gains.brightness[k];
+    const double share = source.weight * (gains.of[k] - gains.once) * gains.brightness[k];
     const std::uint16_t* shape =
         &fabric.recolouring.order_shapes[(cell * shading::kOrderShapes + k) * low * low];
     for (std::size_t j1 = 0; j1 < low; ++j1) {
@@ -264,12 +278,13 @@ CarriedMatrices carried_matrices(const Fabric& fabric,
   CarriedMatrices carried{std::vector<float>(database.transfer.size()),
                           std::vector<float>(database.transfer_se.size())};
   for (int channel = 0; channel < 3; ++channel) {
-    const Source source = nearest_source(fabric, materials, channel);
-    for (std::size_t cell = 0; cell < cells_of(fabric); ++cell) {
-      const std::size_t first = cell * 3 * n * n;
-      recolour_cell(fabric, cell, source, channel,
-                    {&database.transfer[first], &database.transfer_se[first],
-                     &carried.transfer[first], &carried.transfer_se[first], n});
+    for (const Source& source : sources_of(fabric, materials, channel)) {
+      for (std::size_t cell = 0; cell < cells_of(fabric); ++cell) {
+        const std::size_t first = cell * 3 * n * n;
+        recolour_cell(fabric, cell, source, channel,
+                      {&database.transfer[first], &database.transfer_se[first],
+                       &carried.transfer[first], &carried.transfer_se[first], n});
+      }
     }
   }
   return carried;

@@ -15,7 +15,7 @@ struct CarriedMatrices {
 
 // The transfer matrices of `fabric` as they are estimated to be in the colours of `materials`,
 // without tracing a path (docs/decisions/colourways-by-orders.md). Each channel is taken over from
-// that channel of the old ones which needs the least change. The old colours give the old matrices
+// those channels of the old ones that need little change. The old colours give the old matrices
 // to the bit. REQUIRES: as many materials as there are, of the same widths. Throws
 // core::Error(kFailedPrecondition) when the fabric does not tell orders of scattering apart, or was
 // traced with colours of which nothing follows for the new ones.
