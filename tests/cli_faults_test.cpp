@@ -146,6 +146,7 @@ TEST_F(Faults, KillsAtRandomMomentsChangeNothing) {
                 cluster.attempts().size(),
                 static_cast<unsigned long long>(FaultCluster::shards_done(job)),
                 static_cast<unsigned long long>(times));
+    std::fflush(stdout);
     if (HasFailure()) {
       return;
     }

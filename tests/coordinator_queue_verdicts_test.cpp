@@ -224,6 +224,60 @@ TEST_F(QueueVerdicts, ShardThatKillsWorkersWhichSurviveOthers_IsQuarantinedAsAKi
   EXPECT_EQ(cluster_.job("b").stages[0].failures, 0U);  // losses are no failures
 }
 
+// Machines that somebody kills again and again: what they hold then is not to blame.
+TEST_F(QueueVerdicts, WorkersThatDieElsewhereAsOften_AreNoWitnessesAgainstATask) {
+  constexpr int kElsewhere = 4;
+  cluster_.submit("a", {1});
+  work(join("w0", "host"));  // it gives results
+  int lost = 0;
+  const auto lose_one = [&] {
+    QueueWorker& worker = join(std::string("w").append(std::to_string(++lost)), "host");
+    worker.sync(1);
+    ASSERT_EQ(worker.held.size(), 1U);
+    cluster_.apply(DisconnectEvent{worker.says().worker});
+  };
+  cluster_.submit("c", {20});
+  for (int i = 0; i < kElsewhere; ++i) {
+    lose_one();
+  }
+  cluster_.apply(CancelEvent{"c"});
+  cluster_.submit("b", {1});
+  for (int i = 0; i < 5 + kElsewhere - 1; ++i) {
+    lose_one();
+    EXPECT_FALSE(cluster_.job("b").has_ended()) << i;
+  }
+  lose_one();
+  EXPECT_EQ(cluster_.job("b").phase, JobPhase::kFailed);
+}
+
+TEST_F(QueueVerdicts, LossesElsewhere_OutweighThoseOfTheSameNameUntilItIsHopeless) {
+  ShardTrouble trouble;
+  trouble.lone_losses.assign(5, LoneLoss{"host", {}, true});
+  EXPECT_TRUE(judge_losses(trouble, {}, {}));
+  EXPECT_TRUE(judge_losses(trouble, {{"other", 9}}, {}));
+  EXPECT_FALSE(judge_losses(trouble, {{"host", 1}}, {}));
+  trouble.lone_losses.assign(24, LoneLoss{"host", {}, true});
+  EXPECT_FALSE(judge_losses(trouble, {{"host", 99}}, {}));
+  trouble.lone_losses.push_back({"host", {}, true});
+  EXPECT_TRUE(judge_losses(trouble, {{"host", 99}}, {}));
+}
+
+TEST_F(QueueVerdicts, LossesElsewhere_CountAcrossARestart) {
+  for (const bool is_elsewhere : {false, true}) {
+    QueueCluster cluster;
+    cluster.hold_plans = true;
+    cluster.submit("a", {2}, "", core::Digest{});
+    PlannedEvent planned{"a", 0, {}};
+    PlannedStage& stage = planned.stages.emplace_back();
+    stage.name = all_stages()[0];
+    stage.digests = {QueueCluster::work("a", 0, 0), QueueCluster::work("a", 0, 1)};
+    stage.failures.assign(5, {TroubleKind::kLoneLoss, 0, "host", "its worker fell silent"});
+    stage.losses.push_back({"w1", "host", is_elsewhere ? 1U : 0U, 1, cluster.now});
+    cluster.apply(planned);
+    EXPECT_EQ(cluster.job("a").stages[0].quarantined, is_elsewhere ? 0U : 1U);
+  }
+}
+
 TEST_F(QueueVerdicts, WorkersThatDieOfEverything_AreNoWitnessesAgainstATask) {
   cluster_.submit("a", {1});
   for (int i = 0; i < 9; ++i) {

@@ -31,6 +31,8 @@ struct QueueSettings {
   std::uint32_t lonely_loss_limit = 5;
   // ... or so many lost workers of which nobody knows whether they survive other tasks.
   std::uint32_t unconfirmed_loss_limit = 10;
+  // ... or so many, though these workers are lost with other tasks, too.
+  std::uint32_t hopeless_loss_limit = 25;
   std::uint32_t retry_ms = 1'000;          // doubles with each failure of the shard
   std::uint32_t short_ms = 5'000;          // back-off when a resource is short; doubles up to ...
   std::uint32_t short_limit_ms = 300'000;  // ... this
@@ -162,12 +164,22 @@ struct PriorAttempt {
   Purpose purpose = Purpose::kFirst;
 };
 
+// An attempt that was lost with its worker before a restart.
+struct PriorLoss {
+  std::string worker;  // id
+  std::string worker_name;
+  std::uint64_t first_shard = 0;
+  std::uint64_t shards = 0;
+  Time at{};
+};
+
 struct PlannedStage {
   StageName name = StageName::kGeometry;
   std::vector<core::Digest> digests;  // of the shards' work, by index
   std::vector<KnownResult> known;     // results that need not be computed
   std::vector<PriorFailure> failures;
   std::vector<PriorAttempt> attempts;
+  std::vector<PriorLoss> losses;
   core::Digest scene;              // inputs[0]: workers that hold it come first; zero: none
   std::uint64_t memory_bytes = 0;  // what a worker needs for a run; 0: nothing to speak of
 };

@@ -178,6 +178,7 @@ void Queue::on(const TickEvent& /*event*/, Time now, Actions& actions) {
   });
   std::erase_if(lost_, [&](const auto& entry) { return now - entry.second.at > memory; });
   std::erase_if(passed_at_, [&](const auto& entry) { return now - entry.second > 2 * memory; });
+  deaths_.forget_before(now - memory);
 }
 
 void Queue::ask_for_plan(JobState& job, Actions& actions) {

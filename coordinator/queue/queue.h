@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/queue/deaths.h"
 #include "coordinator/queue/events.h"
 #include "coordinator/queue/fairness.h"
 #include "coordinator/queue/state.h"
@@ -204,6 +205,9 @@ class Queue {
                   Time now, Actions& actions);
   void confirm_losses(JobState& job, std::size_t stage, Time now, Actions& actions);
   [[nodiscard]] bool survives(const LoneLoss& loss) const;
+  [[nodiscard]] std::map<std::string, std::size_t> losses_elsewhere(const JobState& job,
+                                                                    const StageState& stage,
+                                                                    std::uint64_t shard) const;
   static void absolve(StageState& stage, std::uint64_t shard, const std::string& worker_name);
   void short_of_resource(const Attempt& attempt, const std::string& worker, Time now);
   void note_failure(StageState& stage, const std::string& worker, Time now);
@@ -315,6 +319,7 @@ class Queue {
   std::set<std::pair<Time, std::uint64_t>> leases_;  // by their ends
   std::map<std::string, std::set<std::uint64_t>> attempts_of_worker_;  // by the worker's id
   std::map<std::uint64_t, LostAttempt> lost_;
+  Deaths deaths_;
   // Attempts of earlier epochs that ended in this one for another reason than silence: they are not
   // taken up again.
   std::set<std::uint64_t> ended_for_good_;

@@ -390,6 +390,9 @@ bool Queue::adopt(const Attempt& run, const std::string& worker, Time now, Actio
   if (was_lost && run.shards == 1) {
     absolve(stage, run.first_shard, attempt.worker_name);
   }
+  if (was_lost) {
+    deaths_.take_back(attempt.worker_name, worker);
+  }
   lost_.erase(run.id);
   take_shards(attempt);
   const Attempt& begun = begin_attempt(std::move(attempt), now);

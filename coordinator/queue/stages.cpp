@@ -95,6 +95,10 @@ void Queue::add_stage(std::uint64_t order, JobState& job, const PlannedStage& pl
       put_back(stage, prior.shard, kSuspectRunShards.size());
     }
   }
+  for (const PriorLoss& loss : planned.losses) {
+    deaths_.add(loss.worker_name, loss.worker, loss.at,
+                {job.id, stage.name, loss.first_shard, loss.shards});
+  }
   for (const PriorAttempt& prior : planned.attempts) {
     restore(job, index, prior, now, actions);
   }

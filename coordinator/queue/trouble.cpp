@@ -45,6 +45,8 @@ void Queue::lose(std::uint64_t id, Time now, Actions& actions) {
     return;
   }
   lost_[id] = {attempt.worker, now};
+  deaths_.add(attempt.worker_name, attempt.worker, now,
+              {job.id, stage.name, attempt.first_shard, attempt.shards});
   const std::uint64_t shard = attempt.first_shard;
   const bool is_alone = attempt.shards == 1 && stage.shards[shard] == ShardState::kRunning &&
                         !stage.doubled.contains(shard);
@@ -130,7 +132,8 @@ void Queue::judge(JobState& job, std::size_t index, std::uint64_t shard, Time no
       stage.shards[shard] != ShardState::kPending) {
     return;
   }
-  std::optional<Verdict> verdict = judge_losses(trouble->second, settings_);
+  std::optional<Verdict> verdict =
+      judge_losses(trouble->second, losses_elsewhere(job, stage, shard), settings_);
   if (!verdict) {
     verdict = judge_failures(trouble->second, eligible(job, stage, now), settings_);
   }
@@ -151,6 +154,35 @@ void Queue::quarantine(JobState& job, std::size_t index, std::uint64_t shard,
   ++job.revision;
   actions.wake = true;
   refresh(job, now);
+}
+
+// How often workers of those names that were lost with the shard alone were lost without it. A
+// death that another shard is suspected of speaks neither way.
+std::map<std::string, std::size_t> Queue::losses_elsewhere(const JobState& job,
+                                                           const StageState& stage,
+                                                           std::uint64_t shard) const {
+  constexpr std::size_t kSuspicious = 3;
+  const auto is_suspicious = [&](const Deaths::Held& held) {
+    const JobState* const of = held.shards == 1 ? this->job(held.job) : nullptr;
+    if (of == nullptr) {
+      return false;
+    }
+    return std::any_of(of->stages.begin(), of->stages.end(), [&](const StageState& other) {
+      const auto trouble = other.troubles.find(held.first_shard);
+      return other.name == held.stage && trouble != other.troubles.end() &&
+             trouble->second.lone_losses.size() >= kSuspicious;
+    });
+  };
+  std::map<std::string, std::size_t> elsewhere;
+  for (const LoneLoss& loss : stage.troubles.at(shard).lone_losses) {
+    if (!elsewhere.contains(loss.worker)) {
+      elsewhere[loss.worker] = deaths_.elsewhere(loss.worker, [&](const Deaths::Held& held) {
+        return (held.job == job.id && held.stage == stage.name && held.contains(shard)) ||
+               is_suspicious(held);
+      });
+    }
+  }
+  return elsewhere;
 }
 
 // A lost worker counts against a shard when others of its name gave results since, or it did
@@ -293,8 +325,9 @@ void Queue::forgive_shard(const ShardRef& ref, const std::string& worker_name, T
   }
   ShardTrouble& trouble = stage.troubles.at(ref.shard);
   trouble.forgive(worker_name);
-  const bool still_stands = judge_losses(trouble, settings_) ||
-                            judge_failures(trouble, eligible(job, stage, now), settings_);
+  const bool still_stands =
+      judge_losses(trouble, losses_elsewhere(job, stage, ref.shard), settings_) ||
+      judge_failures(trouble, eligible(job, stage, now), settings_);
   trouble.retry_at = std::min(trouble.retry_at, now);
   if (trouble.is_empty()) {
     stage.troubles.erase(ref.shard);

@@ -68,12 +68,24 @@ std::optional<Verdict> judge_failures(const ShardTrouble& trouble,
                  names_of(trouble)};
 }
 
-std::optional<Verdict> judge_losses(const ShardTrouble& trouble, const QueueSettings& settings) {
-  const auto confirmed = std::count_if(trouble.lone_losses.begin(), trouble.lone_losses.end(),
-                                       [](const LoneLoss& loss) { return loss.is_confirmed; });
+std::optional<Verdict> judge_losses(const ShardTrouble& trouble,
+                                    const std::map<std::string, std::size_t>& elsewhere,
+                                    const QueueSettings& settings) {
   const std::size_t all = trouble.lone_losses.size();
-  if (confirmed < static_cast<std::ptrdiff_t>(settings.lonely_loss_limit) &&
-      all < settings.unconfirmed_loss_limit) {
+  std::size_t confirmed = 0;
+  std::size_t of_whichever = 0;
+  std::map<std::string, std::size_t> outweighed = elsewhere;
+  for (const LoneLoss& loss : trouble.lone_losses) {
+    std::size_t& left = outweighed[loss.worker];
+    if (left > 0) {
+      --left;
+      continue;
+    }
+    ++of_whichever;
+    confirmed += loss.is_confirmed ? 1 : 0;
+  }
+  if (confirmed < settings.lonely_loss_limit && of_whichever < settings.unconfirmed_loss_limit &&
+      all < settings.hopeless_loss_limit) {
     return std::nullopt;
   }
   return Verdict{Trouble::Kind::kKiller,

@@ -63,9 +63,12 @@ struct Verdict {
                                                     const QueueSettings& settings);
 
 // The task kills its workers when lonely_loss_limit of them that survive other tasks were lost
-// while they ran it alone, or unconfirmed_loss_limit of whichever.
-[[nodiscard]] std::optional<Verdict> judge_losses(const ShardTrouble& trouble,
-                                                  const QueueSettings& settings);
+// while they ran it alone, or unconfirmed_loss_limit of whichever. A worker that was lost
+// `elsewhere` (by name) as often dies of something else: each such loss outweighs one of these. At
+// hopeless_loss_limit nothing does.
+[[nodiscard]] std::optional<Verdict> judge_losses(
+    const ShardTrouble& trouble, const std::map<std::string, std::size_t>& elsewhere,
+    const QueueSettings& settings);
 
 // How one worker does with one kind of task.
 struct Conduct {

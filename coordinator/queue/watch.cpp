@@ -98,6 +98,7 @@ void Queue::shift(std::chrono::milliseconds by) {
   for (auto& [id, lost] : lost_) {
     lost.at += by;
   }
+  deaths_.shift(by);
 }
 
 }  // namespace weft::coordinator

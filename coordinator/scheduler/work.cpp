@@ -31,6 +31,7 @@ bool is_short(const core::Error& error) {
 }
 
 constexpr auto kLook = std::chrono::seconds(1);
+constexpr std::size_t kLossesConsidered = 1'000;  // attempts of a stage that are looked through
 constexpr std::uint32_t kTriesLimit = 20;
 constexpr std::chrono::milliseconds kLongestPause{60'000};
 
@@ -168,6 +169,16 @@ std::vector<PlannedStage> Scheduler::look_up(const std::string& job,
     for (FailureRecord& failure : journal_.failures_of(job, stage.name)) {
       of_stage.failures.push_back(
           {failure.kind, failure.shard, std::move(failure.worker), std::move(failure.message)});
+    }
+    for (KeptAttempt& attempt : journal_.attempts_of(
+             job, kLossesConsidered,
+             [&](const AttemptRecord& begun) { return begun.stage == stage.name; })) {
+      if (attempt.end && attempt.end->outcome == Outcome::kLost) {
+        of_stage.losses.push_back({std::move(attempt.begin.worker),
+                                   std::move(attempt.begin.worker_name), attempt.begin.first_shard,
+                                   attempt.begin.shards,
+                                   Time(std::chrono::milliseconds(attempt.end->ended_at_ms))});
+      }
     }
     for (AttemptRecord& attempt : journal_.running_attempts(job, stage.name)) {
       of_stage.attempts.push_back({attempt.attempt, attempt.first_shard, attempt.shards,

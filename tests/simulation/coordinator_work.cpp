@@ -119,6 +119,14 @@ PlannedStage CoordinatorModel::with_known(const std::string& job, const FakeStag
       planned.failures.push_back({failure.kind, failure.shard, failure.worker, failure.message});
     }
   }
+  for (const auto& [id, loss] : tables.lost) {
+    const auto& [attempt, at_ms] = loss;
+    if (attempt.job == job && attempt.stage == stage.name) {
+      planned.losses.push_back({attempt.worker, attempt.worker_name, attempt.first_shard,
+                                attempt.shards,
+                                coordinator::Time(std::chrono::milliseconds(at_ms))});
+    }
+  }
   for (const auto& [id, attempt] : tables.attempts) {
     const bool is_of_earlier_epoch = id >> 32 < process_->epoch;
     if (attempt.job == job && attempt.stage == stage.name && is_of_earlier_epoch) {

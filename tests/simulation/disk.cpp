@@ -74,8 +74,17 @@ struct Apply {
       tables.blocks.erase({row.worker, row.stage});
     }
   }
-  void operator()(const AttemptRecord& row) const { tables.attempts[row.attempt] = row; }
-  void operator()(const AttemptEndRecord& row) const { tables.attempts.erase(row.attempt); }
+  void operator()(const AttemptRecord& row) const {
+    tables.attempts[row.attempt] = row;
+    tables.lost.erase(row.attempt);
+  }
+  void operator()(const AttemptEndRecord& row) const {
+    const auto begun = tables.attempts.find(row.attempt);
+    if (begun != tables.attempts.end() && row.outcome == Outcome::kLost) {
+      tables.lost[row.attempt] = {begun->second, row.ended_at_ms};
+    }
+    tables.attempts.erase(row.attempt);
+  }
   void operator()(const MismatchRecord& row) const {
     std::erase_if(tables.mismatches, [&](const MismatchRecord& open) {
       return open.job == row.job && open.stage == row.stage && open.shard == row.shard &&

@@ -83,7 +83,8 @@ struct Tables {
   std::vector<coordinator::FailureRecord> failures;
   std::vector<coordinator::MismatchRecord> mismatches;
   std::map<std::uint64_t, coordinator::AttemptRecord> attempts;  // that have not ended
-  std::map<std::pair<std::string, StageName>, bool> blocks;      // whether for lies
+  std::map<std::uint64_t, std::pair<coordinator::AttemptRecord, std::int64_t>> lost;  // and when
+  std::map<std::pair<std::string, StageName>, bool> blocks;  // whether for lies
   std::set<std::string> drained;
   std::vector<std::pair<std::string, core::Digest>> versions;  // fabric, database
 
