@@ -8,7 +8,7 @@ namespace weft::core {
 // When a cell has enough paths. The baker that stops and the commit that checks where it stopped
 // share this rule. It looks at whole blocks of paths only, in order, so that where a cell stops
 // depends on its paths and on nothing else.
-inline constexpr std::uint64_t kStoppingBlockPaths = 1024;
+inline constexpr std::uint64_t kStoppingBlockPaths = 256;
 // Fewer say too little about their own error. Measured over seeds, four know it to 1.5 % (standard
 // deviation) with exit sampling, and to 10 % (wide lobes) to 30 % (lobes of 0.6 degrees) with
 // lights.

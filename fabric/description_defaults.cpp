@@ -84,7 +84,8 @@ void expand_precompute(v1::Precompute& settings) {
   };
   using Settings = v1::Precompute;
   count(settings.has_sh_order(), &Settings::set_sh_order, 5);
-  count(settings.has_paths_per_cell(), &Settings::set_paths_per_cell, 50000);
+  const bool is_by_exit = settings.transfer_estimator() == v1::TRANSFER_ESTIMATOR_EXIT;
+  count(settings.has_paths_per_cell(), &Settings::set_paths_per_cell, is_by_exit ? 4096 : 50000);
   count(settings.has_visibility_resolution(), &Settings::set_visibility_resolution, 128);
   count(settings.has_pca_components(), &Settings::set_pca_components, 48);
   count(settings.has_pca_sample_segments(), &Settings::set_pca_sample_segments, 4096);
@@ -148,7 +149,7 @@ void apply_quality(v1::FabricDescription& description) {
   v1::Precompute& settings = *description.mutable_precompute();
   v1::Exemplar& exemplar = *description.mutable_exemplar();
   if (settings.quality() == v1::QUALITY_PREVIEW) {
-    settings.set_paths_per_cell(std::min(settings.paths_per_cell(), 4096U));
+    settings.set_paths_per_cell(std::min(settings.paths_per_cell(), 2048U));
     settings.set_visibility_resolution(std::min(settings.visibility_resolution(), 128U));
     settings.set_pca_sample_segments(std::min(settings.pca_sample_segments(), 1024U));
     settings.set_cell_length_mfp(std::max(settings.cell_length_mfp(), 2.5));
@@ -157,7 +158,7 @@ void apply_quality(v1::FabricDescription& description) {
     thin_for_preview(description);
   } else if (settings.quality() == v1::QUALITY_BEST) {
     settings.set_sh_order(std::max(settings.sh_order(), 5U));
-    settings.set_paths_per_cell(std::max(settings.paths_per_cell(), 200000U));
+    settings.set_paths_per_cell(std::max(settings.paths_per_cell(), 16384U));
     settings.set_visibility_resolution(std::max(settings.visibility_resolution(), 128U));
     settings.set_pca_sample_segments(std::max(settings.pca_sample_segments(), 4096U));
     settings.set_pca_components(std::max(settings.pca_components(), 64U));

@@ -67,7 +67,7 @@ TEST(Description, IsCanonicalOnceLoaded) {
   EXPECT_EQ(once.yarns(0).fibres_per_ply(), 40U);
   EXPECT_NEAR(once.yarns(0).fibre_radius_mm(), 0.2 * std::sqrt(0.5 / 40), 1e-12);
   EXPECT_EQ(once.precompute().quality(), v1::QUALITY_PAPER);
-  EXPECT_EQ(once.precompute().paths_per_cell(), 50000U);
+  EXPECT_EQ(once.precompute().paths_per_cell(), 4096U);
   EXPECT_FALSE(once.precompute().has_target_standard_error());
   std::string text;
   ASSERT_TRUE(google::protobuf::TextFormat::PrintToString(once, &text));
@@ -254,7 +254,7 @@ TEST(Description, ExamplesAreOfTheSizesOfTable1) {
     const v1::FabricDescription preview = load_description(path, v1::QUALITY_PREVIEW);
     EXPECT_LE(estimate_tile(preview).segments, kPreviewSegments * 11 / 10) << size.name;
     EXPECT_EQ(preview.precompute().visibility_resolution(), 128U);
-    EXPECT_EQ(preview.precompute().paths_per_cell(), 4096U);
+    EXPECT_EQ(preview.precompute().paths_per_cell(), 2048U);
   }
 }
 

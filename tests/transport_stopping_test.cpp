@@ -48,12 +48,13 @@ class TransportStopping : public testing::Test {
 };
 
 TEST_F(TransportStopping, EndsAtTheFirstBlocksThatReachTheTarget) {
-  const double target = error_of(first(7 * 1024));
-  std::uint64_t expected = 4 * 1024;
+  constexpr std::uint64_t kBlock = core::kStoppingBlockPaths;
+  const double target = error_of(first(7 * kBlock));
+  std::uint64_t expected = core::kFewestStoppingBlocks * kBlock;
   while (error_of(first(expected)) > target) {
-    expected += 1024;
+    expected += kBlock;
   }
-  ASSERT_GT(expected, 4U * 1024);
+  ASSERT_GT(expected, core::kFewestStoppingBlocks * kBlock);
   const TransferSums found = to_error(target, 50'000);
   EXPECT_EQ(found.paths, expected);
   EXPECT_LE(error_of(found), target);
@@ -79,8 +80,8 @@ TEST_F(TransportStopping, UsesAllPathsWhereTheTargetIsOutOfReach) {
 // seeds it has a standard deviation of 1.5 %.
 TEST_F(TransportStopping, FourBlocksKnowTheirErrorToAFewPercent) {
   settings_.sh_order = 5;
-  const double long_run = error_of(first(64 * 1024)) * 4;
-  EXPECT_NEAR(error_of(first(4 * 1024)), long_run, 0.05 * long_run);
+  const double long_run = error_of(first(256 * 256)) * 8;
+  EXPECT_NEAR(error_of(first(4 * 256)), long_run, 0.1 * long_run);
 }
 
 TEST_F(TransportStopping, CancellationEndsTheWork) {
