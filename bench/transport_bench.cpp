@@ -8,17 +8,21 @@
 
 #include <benchmark/benchmark.h>
 
+#include "bench/machine_limits.h"
 #include "core/random.h"
 #include "fabric/build.h"
 #include "fabric/description.h"
 #include "shading/fibre_bcsdf.h"
+#include "transport/normal_equations.h"
 #include "transport/pca.h"
+#include "transport/sh_chunk.h"
 #include "transport/signed_distance.h"
 #include "transport/sphere.h"
 #include "transport/transfer.h"
 #include "transport/visibility.h"
 #include "transport/visibility_raster.h"
 #include "transport/visibility_sg.h"
+#include "transport/wide.h"
 
 namespace {
 
@@ -52,6 +56,15 @@ const fabric::Tile& satin() {
 const transport::Scene& scene() {
   static const transport::Scene built(satin());
   return built;
+}
+
+// Sets a kernel's multiply-adds against those that the thread could do at best.
+void set_multiply_adds(benchmark::State& state, double each) {
+  state.counters["multiply_adds/s"] =
+      benchmark::Counter(each, benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["share_of_limit"] =
+      benchmark::Counter(each / bench::machine_limits().multiply_adds_per_s,
+                         benchmark::Counter::kIsIterationInvariantRate);
 }
 
 std::uint32_t some_segment(std::uint64_t i) {
@@ -129,8 +142,57 @@ void pca(benchmark::State& state) {
   for (auto unused : state) {
     benchmark::DoNotOptimize(transport::principal_components(sample, kPixels, 48, 1));
   }
+  // 64 columns to and fro in three iterations, and once more at the end.
+  set_multiply_adds(state, 7.0 * 64 * kPixels * static_cast<double>(count));
 }
 BENCHMARK(pca)->Arg(1024)->Arg(4096)->Unit(benchmark::kSecond)->Iterations(1);
+
+// The step of a fit of 48 coefficients: 2,048 points of which half cost something.
+void normal_equations(benchmark::State& state) {
+  constexpr std::size_t kRows = 1024;
+  constexpr std::size_t kWidth = 48;
+  core::Random random(6, 0);
+  std::vector<float> a(kRows * kWidth);
+  std::vector<float> b(kRows);
+  for (std::vector<float>* numbers : {&a, &b}) {
+    for (float& number : *numbers) {
+      number = random.uniform() - 0.5F;
+    }
+  }
+  std::vector<float> matrix(kWidth * kWidth);
+  std::vector<float> vector(kWidth);
+  const bool is_wide = transport::wide_is_available();
+  for (auto unused : state) {
+    transport::form_normal_equations(a, b, kRows, is_wide, matrix, vector);
+    benchmark::DoNotOptimize(matrix.data());
+  }
+  set_multiply_adds(state, kRows * kWidth * ((kWidth + 1) / 2.0 + 1));
+}
+BENCHMARK(normal_equations)->Unit(benchmark::kMicrosecond);
+
+// What a chunk of paths of one light each adds to sums and sums of squares of order 5.
+void transfer_sums_of_256(benchmark::State& state) {
+  constexpr std::size_t kPaths = 256;
+  transport::ShChunk chunk(5);
+  std::vector<std::int64_t> sum(chunk.size());
+  std::vector<std::int64_t> sum_of_squares(chunk.size());
+  core::Random random(8, 0);
+  std::vector<glm::vec3> directions;
+  for (std::size_t i = 0; i <= kPaths; ++i) {
+    directions.push_back(
+        glm::normalize(glm::vec3(random.uniform(), random.uniform(), random.uniform()) - 0.5F));
+  }
+  for (auto unused : state) {
+    for (std::size_t i = 0; i < kPaths; ++i) {
+      const transport::LightSample light{{0.5F, 0.4F, 0.3F}, directions[i]};
+      chunk.add(directions[i + 1], {&light, 1});
+    }
+    chunk.flush(sum, sum_of_squares);
+    benchmark::DoNotOptimize(sum.data());
+  }
+  set_multiply_adds(state, 2.0 * static_cast<double>(chunk.size()) * kPaths);
+}
+BENCHMARK(transfer_sums_of_256)->Unit(benchmark::kMicrosecond);
 
 void paths(benchmark::State& state) {
   shading::FibreMaterial material;
