@@ -26,12 +26,12 @@ const std::vector<Group>& groups() {
       {"Follow and steer jobs",
        {add_jobs, add_watch, add_explain, add_logs, add_pause, add_resume, add_priority, add_cancel,
         add_retry}},
-      {"Workers", {add_workers, add_drain, add_unblock}},
+      {"Workers", {add_workers, add_drain, add_unblock, add_scale}},
       {"Published fabrics",
        {add_fabrics, add_versions, add_fetch, add_log, add_diff, add_tag, add_untag, add_rollback,
         add_gc}},
       {"Pictures and databases", {add_render, add_compare, add_inspect, add_verify}},
-      {"This machine", {add_doctor, add_config, add_certs, add_completion, add_man}}};
+      {"This machine", {add_doctor, add_health, add_config, add_certs, add_completion, add_man}}};
   return all;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -25,9 +26,15 @@ std::string read(const std::filesystem::path& path) {
   }
 }
 
+// A key of root's that we read as one of its group was given to us, as containers are given secrets.
 void check_privacy(const std::filesystem::path& key) {
   struct stat about {};
-  if (stat(key.c_str(), &about) == 0 && (about.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+  if (stat(key.c_str(), &about) != 0) {
+    return;  // reading it says why
+  }
+  const bool is_given = about.st_uid == 0 && ::geteuid() != 0;
+  const mode_t too_much = is_given ? S_IWGRP | S_IXGRP | S_IRWXO : S_IRWXG | S_IRWXO;
+  if ((about.st_mode & too_much) != 0) {
     throw core::Error(core::Code::kPermissionDenied,
                       fmt::format("others may read the key {}; say 'chmod 600 {}', and issue the "
                                   "certificate anew if they have",
