@@ -30,8 +30,8 @@ void add_retry(CLI::App& app);
 void add_workers(CLI::App& app);
 void add_drain(CLI::App& app);
 void add_unblock(CLI::App& app);
-void add_health(CLI::App& app);   // for probes
-void add_scale(CLI::App& app);    // workers on engines that exist: Slurm
+void add_health(CLI::App& app);  // for probes
+void add_scale(CLI::App& app);   // workers on engines that exist: Slurm
 void add_fabrics(CLI::App& app);
 void add_versions(CLI::App& app);
 void add_fetch(CLI::App& app);

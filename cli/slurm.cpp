@@ -75,11 +75,11 @@ SlurmQueue slurm_queue(const std::string& job_name) {
 std::vector<std::string> sbatch_arguments(const SlurmWorkers& workers, std::uint32_t count) {
   std::string script = "exec";
   for (const std::string& word : workers.command) {
-    script += " " + quoted(word);
+    script.append(" ").append(quoted(word));
   }
   if (!workers.name_prefix.empty()) {
-    script += " --name " + quoted(workers.name_prefix) +
-              "-\"$SLURM_ARRAY_JOB_ID\"-\"$SLURM_ARRAY_TASK_ID\"";
+    script += fmt::format(" --name {}-\"$SLURM_ARRAY_JOB_ID\"-\"$SLURM_ARRAY_TASK_ID\"",
+                          quoted(workers.name_prefix));
   }
   std::vector<std::string> arguments{
       "sbatch",

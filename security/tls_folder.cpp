@@ -26,7 +26,8 @@ std::string read(const std::filesystem::path& path) {
   }
 }
 
-// A key of root's that we read as one of its group was given to us, as containers are given secrets.
+// A key of root's that we read as one of its group was given to us, as containers are given
+// secrets.
 void check_privacy(const std::filesystem::path& key) {
   struct stat about {};
   if (stat(key.c_str(), &about) != 0) {
