@@ -16,7 +16,7 @@ namespace weft::cli {
 namespace {
 
 constexpr const char* kHelp =
-    "Start a coordinator with its status page and workers on this machine, until Ctrl-C.\n"
+    "Start a coordinator, its page and workers on this machine, until Ctrl-C.\n"
     "Prints the address when all are ready. The state (journal, results, published versions) and\n"
     "the logs stay in the state folder: started again, it goes on with the jobs it had. A worker\n"
     "that ends unasked is started again. SIGTERM and Ctrl-C stop everything, workers first; work\n"
