@@ -267,7 +267,7 @@ TEST_F(CommitTest, CellsMayEndWhereTheTargetStandardErrorLetsThemAndNowhereElse)
   };
   EXPECT_THAT(refusal_of(0.9999 * error, 6144),
               testing::AllOf(HasSubstr("stage transfer, shard 1"), HasSubstr("paths end")));
-  for (const std::uint64_t paths : {3072, 6100, 9999}) {
+  for (const std::uint64_t paths : {768, 6100, 9999}) {
     EXPECT_THAT(refusal_of(0.5, paths), HasSubstr("stage transfer, shard 1")) << paths;
   }
   // Without a target a cell has the planned paths.

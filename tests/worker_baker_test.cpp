@@ -288,14 +288,14 @@ TEST(WorkerBaker, TransferToAnError_UsesAsManyPathsAsTheCellNeeds) {
     EXPECT_EQ(result, bake(target_context(kTarget), cell));
     const StoppedCell found = stopped_cell(result);
     EXPECT_LE(found.error, kTarget);
-    EXPECT_EQ(found.paths % 1024, 0u);
-    EXPECT_GE(found.paths, 4096u);
+    EXPECT_EQ(found.paths % core::kStoppingBlockPaths, 0u);
+    EXPECT_GE(found.paths, 1024u);
     EXPECT_LT(found.paths, 20'000u);
     counts.insert(found.paths);
   }
   EXPECT_GT(counts.size(), 1u);
   EXPECT_EQ(stopped_cell(bake(target_context(1e-6), 0)).paths, 20'000u);
-  EXPECT_EQ(stopped_cell(bake(target_context(1), 0)).paths, 4096u);
+  EXPECT_EQ(stopped_cell(bake(target_context(1), 0)).paths, 1024u);
 }
 
 TEST(WorkerBaker, ManyThreadsAndFloatModes_GiveTheSameBytes) {
