@@ -121,7 +121,9 @@ TEST_F(Versions, AreTaggedComparedRolledBackAndRemembered) {
   EXPECT_FALSE(different.contains("/exemplar/points_mm"));
   const Finished words = cluster_.weft({"diff", "tiny@1", "tiny@2"});
   EXPECT_NE(words.out.find("materials[0].c_tt.r: 0.15 -> 0.23"), std::string::npos) << words.out;
-  EXPECT_NE(cluster_.weft({"diff", "tiny@1", "tiny@1"}).out.find("41 of 41"), std::string::npos);
+  const std::string all = std::to_string(diff.at("datasets").size());
+  const Finished same = cluster_.weft({"diff", "tiny@1", "tiny@1"});
+  EXPECT_NE(same.out.find(all + " of " + all), std::string::npos) << same.out;
 
   EXPECT_EQ(json({"tag", "tiny@1", "approved"}).at("tags").at(0), "approved");
   EXPECT_EQ(json({"fetch", "tiny:approved", "-o", folder_ / "a.h5"}).at("version").at("number"), 1);
