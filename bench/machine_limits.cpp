@@ -1,9 +1,9 @@
 #include "bench/machine_limits.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <numeric>
 #include <vector>
 
@@ -23,8 +23,8 @@ constexpr std::uint64_t kSteps = 4'000'000;  // of each chain
 
 // Each leaves the sums where the compiler must believe that somebody reads them.
 double chains_of_8() {
-  std::array<__m256, kChains> sum;
-  sum.fill(_mm256_set1_ps(1));
+  __m256 sum[kChains];
+  std::fill(std::begin(sum), std::end(sum), _mm256_set1_ps(1));
   const __m256 factor = _mm256_set1_ps(0.999F);
   const double before = core::thread_cpu_seconds();
   for (std::uint64_t step = 0; step < kSteps; ++step) {
@@ -37,8 +37,8 @@ double chains_of_8() {
 }
 
 WEFT_WIDE double chains_of_16() {
-  std::array<__m512, kChains> sum;
-  sum.fill(_mm512_set1_ps(1));
+  __m512 sum[kChains];
+  std::fill(std::begin(sum), std::end(sum), _mm512_set1_ps(1));
   const __m512 factor = _mm512_set1_ps(0.999F);
   const double before = core::thread_cpu_seconds();
   for (std::uint64_t step = 0; step < kSteps; ++step) {
