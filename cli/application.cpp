@@ -21,7 +21,7 @@ struct Group {
 // One line per group; every command of commands.h is in one.
 const std::vector<Group>& groups() {
   static const std::vector<Group> all{
-      {"Describe a fabric", {add_new, add_import, add_preview, add_export}},
+      {"Describe a fabric", {add_new, add_import, add_preview, add_expand, add_export}},
       {"Precompute it", {add_run, add_submit, add_recolor, add_up}},
       {"Follow and steer jobs",
        {add_jobs, add_watch, add_explain, add_logs, add_pause, add_resume, add_priority, add_cancel,
@@ -30,7 +30,7 @@ const std::vector<Group>& groups() {
       {"Published fabrics",
        {add_fabrics, add_versions, add_fetch, add_log, add_diff, add_tag, add_untag, add_rollback,
         add_gc}},
-      {"Pictures and databases", {add_render, add_compare, add_inspect, add_verify}},
+      {"Pictures and databases", {add_render, add_compare, add_maps, add_inspect, add_verify}},
       {"This machine", {add_doctor, add_health, add_config, add_certs, add_completion, add_man}}};
   return all;
 }

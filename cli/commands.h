@@ -14,7 +14,9 @@ namespace weft::cli {
 void add_new(CLI::App& app);      // new --preset silk: start a description
 void add_import(CLI::App& app);   // import DRAFT.wif -o FABRIC.textproto
 void add_preview(CLI::App& app);  // draw the geometry
+void add_expand(CLI::App& app);   // a description in full
 void add_export(CLI::App& app);   // fibres as curves for other programs
+void add_maps(CLI::App& app);     // pictures of one tile for other renderers
 void add_run(CLI::App& app);      // the whole precomputation in one process
 void add_up(CLI::App& app);       // a local cluster
 void add_submit(CLI::App& app);

@@ -25,7 +25,8 @@ namespace {
 
 const std::map<std::string, fabric::CurveFormat> kFormats = {{"pbrt", fabric::CurveFormat::kPbrt},
                                                              {"bcc", fabric::CurveFormat::kBcc},
-                                                             {"obj", fabric::CurveFormat::kObj}};
+                                                             {"obj", fabric::CurveFormat::kObj},
+                                                             {"usda", fabric::CurveFormat::kUsda}};
 
 struct CommandOptions {
   std::string fabric;
@@ -57,9 +58,9 @@ fabric::CurveFormat format_of(const CommandOptions& options) {
   }
   const auto found = kFormats.find(name);
   if (found == kFormats.end()) {
-    throw core::Error(
-        core::Code::kInvalidArgument,
-        "the name '" + options.out + "' does not tell the format; give --format pbrt, bcc or obj");
+    throw core::Error(core::Code::kInvalidArgument,
+                      "the name '" + options.out +
+                          "' does not tell the format; give --format pbrt, bcc, obj or usda");
   }
   return found->second;
 }
@@ -102,10 +103,11 @@ void add_export(CLI::App& app) {
       ->required();
   command->add_option("-o,--out", options->out, "File to write")->required();
   command
-      ->add_option("--format", options->format,
-                   "pbrt curves, Yuksel's binary curve collection (bcc) or OBJ lines "
-                   "(default: by the file's extension)")
-      ->check(CLI::IsMember({"pbrt", "bcc", "obj"}));
+      ->add_option(
+          "--format", options->format,
+          "pbrt curves, Yuksel's binary curve collection (bcc), OBJ lines or USD text (usda) "
+          "(default: by the file's extension)")
+      ->check(CLI::IsMember({"pbrt", "bcc", "obj", "usda"}));
   command->add_option("--tiles", options->tiles, "Copies of the tile across x along")
       ->capture_default_str();
   add_quality_option(*command, options->quality);

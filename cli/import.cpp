@@ -11,6 +11,7 @@
 #include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/estimate.h"
+#include "cli/import_curves.h"
 #include "cli/output_file.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
@@ -19,9 +20,10 @@
 #include "fabric/description.h"
 #include "fabric/description_check.h"
 #include "fabric/draft.h"
-#include "fabric/wif.h"
+#include "fabric/read_draft.h"
 #include "fabric/wif_file.h"
 #include "fabric/wif_import.h"
+#include "fabric/wif_write.h"
 
 namespace weft::cli {
 
@@ -39,6 +41,7 @@ struct ImportCommand {
   std::string crop_ends;
   std::string crop_picks;
   double fibre_share = 1;
+  CurveImport curves;
   bool json = false;
 };
 
@@ -70,7 +73,12 @@ Range parse_range(const std::string& text, const std::string& flag) {
   return range;
 }
 
-fabric::ImportOptions import_options(const ImportCommand& command) {
+// Where a draft of another format is written as WIF, for a description that must refer to it.
+std::filesystem::path wif_beside(const ImportCommand& command) {
+  return std::filesystem::path(command.out).replace_extension(".wif");
+}
+
+fabric::ImportOptions import_options(const ImportCommand& command, bool is_wif) {
   fabric::ImportOptions options;
   const std::filesystem::path draft(command.draft);
   options.name =
@@ -81,7 +89,8 @@ fabric::ImportOptions import_options(const ImportCommand& command) {
         "--name " + options.name + " is no name; use small letters, digits, _ and -, at most 64");
   }
   const std::filesystem::path folder = std::filesystem::absolute(command.out).parent_path();
-  options.wif_reference = std::filesystem::proximate(draft, folder).string();
+  options.draft_name = std::filesystem::proximate(draft, folder).string();
+  options.wif_reference = is_wif ? options.draft_name : wif_beside(command).filename().string();
   const Range ends = parse_range(command.crop_ends, "--crop-ends");
   const Range picks = parse_range(command.crop_picks, "--crop-picks");
   options.crop.set_first_end(ends.first);
@@ -173,11 +182,33 @@ void print_report(const ImportCommand& command, const fabric::WifDraft& draft,
 }
 
 void import(const ImportCommand& command) {
+  if (holds_curves(command.draft)) {
+    CurveImport curves = command.curves;
+    curves.curves = command.draft;
+    curves.out = command.out;
+    curves.name = command.name;
+    curves.json = command.json;
+    import_curves(curves);
+    return;
+  }
   check_output_file(command.out);
-  const fabric::ImportOptions options = import_options(command);
   const std::string text = core::read_file(command.draft, fabric::kMaxWifBytes);
-  const fabric::WifDraft draft = fabric::read_wif(text, command.draft);
-  const fabric::ImportedDraft imported = fabric::import_draft(draft, options);
+  const bool is_wif = fabric::draft_format(text, command.draft) == fabric::DraftFormat::kWif;
+  const fabric::ImportOptions options = import_options(command, is_wif);
+  const fabric::WifDraft draft = fabric::read_draft(text, command.draft);
+  fabric::ImportedDraft imported = fabric::import_draft(draft, options);
+  if (imported.refers && !is_wif) {
+    const std::filesystem::path wif = wif_beside(command);
+    if (std::filesystem::exists(wif)) {
+      throw core::Error(core::Code::kAlreadyExists,
+                        wif.string() +
+                            " exists already, and the draft, too large to stand in the "
+                            "description, would be written there; choose another -o");
+    }
+    core::write_file_atomically(wif, fabric::write_wif(draft));
+    imported.notes.push_back(
+        "the draft is too large to stand in the description; it was written as " + wif.string());
+  }
   core::write_file_atomically(command.out, imported.text);
   const Expectation expected = expect(imported, command);
   if (command.json) {
@@ -193,11 +224,14 @@ void add_import(CLI::App& app) {
   auto command = std::make_shared<ImportCommand>();  // shared: the callback outlives this function
   CLI::App* import_app = add_command(
       app, "import",
-      "Make a fabric description of a weaving draft (WIF).\n"
+      "Make a description of a weaving draft (WIF, DTX, WPO) or of curves (BCC).\n"
       "Prints what the draft left open and what its cloth will need. The description has comments "
       "and is meant to be edited.\n"
       "Example: weft import draft.wif -o mine.textproto");
-  import_app->add_option("draft", command->draft, "Weaving draft (.wif)")->required();
+  import_app
+      ->add_option("draft", command->draft,
+                   "Weaving draft: .wif, Fiberworks .dtx or WeavePoint .wpo; or curves: .bcc")
+      ->required();
   import_app->add_option("-o,--out", command->out, "Description to write (.textproto)")->required();
   import_app->add_option("--name", command->name, "Name of the fabric (default: the file's)");
   import_app->add_option("--crop-ends", command->crop_ends,
@@ -208,6 +242,19 @@ void add_import(CLI::App& app) {
       ->add_option("--fibre-share", command->fibre_share,
                    "Make only this share of the fibres, thicker")
       ->check(CLI::Range(0.001, 1.0))
+      ->capture_default_str();
+  CurveImport& curves = command->curves;
+  import_app->add_option("--period", curves.period,
+                         "Curves: X,Y millimetres after which they repeat");
+  import_app->add_option("--as", curves.as, "Curves: centre lines of yarns, or single fibres")
+      ->check(CLI::IsMember({"yarns", "fibres"}))
+      ->capture_default_str();
+  import_app
+      ->add_option("--unit-mm", curves.mm_per_unit, "Curves: millimetres per unit of the file")
+      ->check(CLI::Range(1e-6, 1e6))
+      ->capture_default_str();
+  import_app->add_option("--radius-mm", curves.radius_mm, "Curves: of the yarns or fibres")
+      ->check(CLI::Range(1e-4, 1e3))
       ->capture_default_str();
   import_app->add_flag("--json", command->json, "Print one JSON value");
   import_app->callback([command] { import(*command); });

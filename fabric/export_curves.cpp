@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 
 #include <glm/common.hpp>
 
@@ -102,12 +103,12 @@ std::string export_obj(const Tile& tile, glm::uvec2 tiles) {
       append_point(out, tile.points_mm[strand.first_point + p] + shift);
       out += "\n";
     }
-    out += "l";
-    for (std::uint32_t p = 0; p < strand.point_count; ++p) {
-      out += " ";
-      out += std::to_string(next_vertex++);
+    // One line for each segment: of longer ones, Blender 3.4 takes the first two points alone.
+    for (std::uint32_t p = 0; p + 1 < strand.point_count; ++p) {
+      out.append("l ").append(std::to_string(next_vertex + p));
+      out.append(" ").append(std::to_string(next_vertex + p + 1)).append("\n");
     }
-    out += "\n";
+    next_vertex += strand.point_count;
   });
   return out;
 }
@@ -152,6 +153,93 @@ std::string export_pbrt(const Tile& tile, const ExportOptions& options) {
   return out;
 }
 
+// What `append` adds, between brackets and with commas.
+template <class Append>
+void append_list(std::string& out, const char* declaration, const Append& append) {
+  out += std::string("        ") + declaration + " = [";
+  bool first = true;
+  append([&](const std::string& item) {
+    out.append(first ? "" : ", ").append(item);
+    first = false;
+  });
+  out += "]";
+}
+
+std::string tuple(glm::vec3 p) {
+  std::string text = "(";
+  text.append(number(p.x)).append(", ").append(number(p.y)).append(", ").append(number(p.z));
+  return text.append(")");
+}
+
+// A name as USD takes it: letters, digits and underscores, no digit first.
+std::string usd_name(std::size_t index, const std::string& name) {
+  std::string result = "material_" + std::to_string(index) + "_";
+  for (const char c : name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    result += plain ? c : '_';
+  }
+  return result;
+}
+
+// The fibres of one material as one prim.
+void append_usd_curves(std::string& out, const Tile& tile, const ExportOptions& options,
+                       std::uint32_t material) {
+  const auto for_each = [&](const auto& visit) {
+    for_each_curve(tile, options.tiles, [&](const Strand& strand, glm::vec3 shift) {
+      if (strand.material == material) {
+        visit(strand, shift);
+      }
+    });
+  };
+  glm::vec3 low(std::numeric_limits<float>::max());
+  glm::vec3 high(std::numeric_limits<float>::lowest());
+  out += "    def BasisCurves \"" + usd_name(material, tile.material_names[material]) +
+         "\"\n    {\n        uniform token type = \"linear\"\n"
+         "        uniform token wrap = \"nonperiodic\"\n";
+  append_list(out, "int[] curveVertexCounts", [&](const auto& add) {
+    for_each([&](const Strand& strand, glm::vec3) { add(std::to_string(strand.point_count)); });
+  });
+  out += "\n";
+  append_list(out, "point3f[] points", [&](const auto& add) {
+    for_each([&](const Strand& strand, glm::vec3 shift) {
+      for (std::uint32_t p = 0; p < strand.point_count; ++p) {
+        const glm::vec3 point = tile.points_mm[strand.first_point + p] + shift;
+        low = glm::min(low, point - strand.radius_mm);
+        high = glm::max(high, point + strand.radius_mm);
+        add(tuple(point));
+      }
+    });
+  });
+  out += "\n";
+  append_list(out, "float[] widths", [&](const auto& add) {
+    for_each([&](const Strand& strand, glm::vec3) { add(number(2 * strand.radius_mm)); });
+  });
+  const glm::vec3 colour =
+      material < options.albedos.size() ? options.albedos[material] : glm::vec3(0.5F);
+  out += " (\n            interpolation = \"uniform\"\n        )\n        float3[] extent = [" +
+         tuple(low) + ", " + tuple(high) + "]\n        color3f[] primvars:displayColor = [" +
+         tuple(glm::clamp(colour, glm::vec3(0), glm::vec3(1))) + "]\n    }\n";
+}
+
+std::string export_usda(const Tile& tile, const ExportOptions& options) {
+  std::string out =
+      "#usda 1.0\n(\n    defaultPrim = \"Fibres\"\n    doc = \"Fibres of woven or knitted cloth, "
+      "written by weft. One tile is " +
+      number(tile.size_mm.x) + " x " + number(tile.size_mm.y) + " mm; this is " +
+      std::to_string(options.tiles.x) + " x " + std::to_string(options.tiles.y) +
+      " tiles.\"\n    metersPerUnit = 0.001\n    upAxis = \"Z\"\n)\n\ndef Xform \"Fibres\"\n{\n";
+  std::vector<bool> is_used(tile.material_names.size());
+  for (const Strand& strand : tile.strands) {
+    is_used[strand.material] = true;
+  }
+  for (std::uint32_t material = 0; material < is_used.size(); ++material) {
+    if (is_used[material]) {
+      append_usd_curves(out, tile, options, material);
+    }
+  }
+  return out + "}\n";
+}
+
 }  // namespace
 
 std::string export_curves(const Tile& tile, const ExportOptions& options) {
@@ -176,6 +264,8 @@ std::string export_curves(const Tile& tile, const ExportOptions& options) {
       return export_bcc(tile, options.tiles);
     case CurveFormat::kObj:
       return export_obj(tile, options.tiles);
+    case CurveFormat::kUsda:
+      return export_usda(tile, options);
   }
   CHECK(false);
 }

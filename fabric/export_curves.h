@@ -12,13 +12,13 @@
 
 namespace weft::fabric {
 
-enum class CurveFormat { kPbrt, kBcc, kObj };
+enum class CurveFormat { kPbrt, kBcc, kObj, kUsda };
 
 // What is written beside the tile.
 struct ExportOptions {
   CurveFormat format = CurveFormat::kObj;
   glm::uvec2 tiles{1, 1};          // copies of the tile across and along
-  std::vector<glm::vec3> albedos;  // linear RGB of each of the tile's materials (pbrt only)
+  std::vector<glm::vec3> albedos;  // linear RGB of each of the tile's materials (pbrt, USDA)
 };
 
 // More control points than this are not written.
@@ -31,7 +31,10 @@ inline constexpr std::uint64_t kExportPointLimit = std::uint64_t{1} << 27;
 //     lie on the straight segments, so that the segments are exact; a material for each of ours.
 //   BCC (Yuksel's binary curve collection): type C0, uniform Catmull-Rom curves through our points,
 //     which is what its readers take; 4-byte integers and floats, three dimensions, z up; no radii.
-//   OBJ: a polyline for each strand, a group for each thread; radii in comments.
+//   OBJ: a line for each segment, a group for each thread; radii in comments.
+//   USDA (text of Universal Scene Description): a BasisCurves of type linear for each material,
+//   with
+//     the strands' widths and the material's colour; metersPerUnit 0.001, z up.
 // Returns the file's bytes. Throws core::Error: kInvalidArgument when tiles has a zero,
 // kResourceExhausted over kExportPointLimit.
 [[nodiscard]] std::string export_curves(const Tile& tile, const ExportOptions& options);

@@ -1,9 +1,10 @@
 #include "fabric/wif.h"
 
 #include <algorithm>
-#include <set>
+#include <optional>
 
 #include "fabric/draft.h"
+#include "fabric/shed.h"
 #include "fabric/wif_file.h"
 #include "fabric/wif_shed.h"
 #include "fabric/wif_threads.h"
@@ -89,28 +90,6 @@ std::uint32_t thread_count(WifFile& file, const char* side,
   return count;
 }
 
-void note_unbound(WifFile& file, const WifDraft& draft) {
-  std::vector<std::uint32_t> over_end(draft.warp.count, 0);
-  std::uint32_t loose_picks = 0;
-  for (std::uint32_t pick = 0; pick < draft.weft.count; ++pick) {
-    std::uint32_t over_pick = 0;
-    for (std::uint32_t end = 0; end < draft.warp.count; ++end) {
-      const std::uint8_t up = draft.up[static_cast<std::size_t>(pick) * draft.warp.count + end];
-      over_end[end] += up;
-      over_pick += up;
-    }
-    loose_picks += over_pick == 0 || over_pick == draft.warp.count ? 1U : 0U;
-  }
-  const auto loose_ends = std::count_if(over_end.begin(), over_end.end(), [&](std::uint32_t n) {
-    return n == 0 || n == draft.weft.count;
-  });
-  if (loose_ends > 0 || loose_picks > 0) {
-    file.note(number_of(static_cast<std::size_t>(loose_ends), "end") + " and " +
-              number_of(loose_picks, "pick") +
-              " never change sides: they lie on the cloth without being bound");
-  }
-}
-
 }  // namespace
 
 WifDraft read_wif(std::string_view text, const std::string& name) {
@@ -132,7 +111,9 @@ WifDraft read_wif(std::string_view text, const std::string& name) {
   read_colour_table(file, draft);
   read_thread_looks(file, "WARP", draft, draft.warp);
   read_thread_looks(file, "WEFT", draft, draft.weft);
-  note_unbound(file, draft);
+  if (const std::optional<std::string> note = note_on_unbound(draft)) {
+    file.note(*note);
+  }
   draft.notes = file.notes();
   return draft;
 }

@@ -1,29 +1,17 @@
 #include "fabric/wif_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <utility>
 
 #include "core/error.h"
+#include "fabric/draft_text.h"
 
 namespace weft::fabric {
 namespace {
 
 constexpr std::uint32_t kMaxKey = 1U << 24;
-
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\f' || c == '\v' || c == '\0'; }
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) {
-    text.remove_prefix(1);
-  }
-  while (!text.empty() && is_blank(text.back())) {
-    text.remove_suffix(1);
-  }
-  return text;
-}
 
 char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
 
@@ -50,57 +38,11 @@ bool is_free_text(const std::string& section) {
   return section == "TEXT" || section == "NOTES" || section == "WIF";
 }
 
-// UTF-16 with a byte order mark as Latin text; anything else unchanged.
-std::string decoded(std::string_view text, bool& was_utf16) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  was_utf16 = text.size() >= 2 &&
-              ((byte(0) == 0xff && byte(1) == 0xfe) || (byte(0) == 0xfe && byte(1) == 0xff));
-  if (!was_utf16) {
-    constexpr std::string_view kMark = "\xef\xbb\xbf";
-    return std::string(text.starts_with(kMark) ? text.substr(kMark.size()) : text);
-  }
-  const std::size_t low = byte(0) == 0xff ? 0 : 1;
-  std::string result;
-  result.reserve(text.size() / 2);
-  for (std::size_t i = 2; i + 1 < text.size(); i += 2) {
-    const char c = text[i + low];
-    result += byte(i + 1 - low) == 0 && byte(i + low) < 0x80 ? c : '?';
-  }
-  return result;
-}
-
-// A value as it may be repeated in a message: short and printable.
-std::string shown(std::string_view text) {
-  constexpr std::size_t kMost = 40;
-  std::string result = "\"";
-  for (const char c : text.substr(0, kMost)) {
-    result += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
-  }
-  return result + (text.size() > kMost ? "...\"" : "\"");
-}
-
-template <class T>
-std::optional<T> parsed(std::string_view text) {
-  if (text.starts_with('+')) {
-    text.remove_prefix(1);
-  }
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) {
-    return std::nullopt;
-  }
-  return value;
-}
-
 }  // namespace
 
 std::string bracketed(std::string_view section) {
   std::string result = "[";
   return result.append(section).append("]");
-}
-
-std::string number_of(std::size_t count, const std::string& thing) {
-  return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
 }
 
 const WifEntry* WifSection::find(std::string_view key) const {
@@ -115,20 +57,16 @@ WifFile::WifFile(std::string_view text, std::string name) : name_(std::move(name
                 std::to_string(kMaxWifBytes));
   }
   bool was_utf16 = false;
-  const std::string plain = decoded(text, was_utf16);
+  const std::string plain = plain_text(text, was_utf16);
   if (was_utf16) {
     note("the file is UTF-16; it was read as plain text");
   }
-  std::uint32_t number = 0;
-  for (std::size_t at = 0; at < plain.size();) {
-    std::size_t end = plain.find_first_of("\r\n", at);
-    end = end == std::string::npos ? plain.size() : end;
-    if (++number > kMaxWifLines) {
+  for_each_line(plain, [this](std::string_view line, std::uint32_t number) {
+    if (number > kMaxWifLines) {
       fail(number, "more than " + std::to_string(kMaxWifLines) + " lines; this is no draft");
     }
-    read_line(trimmed(std::string_view(plain).substr(at, end - at)), number);
-    at = end + (plain.compare(end, 2, "\r\n") == 0 ? 2 : 1);
-  }
+    read_line(line, number);
+  });
   if (sections_.empty()) {
     fail(1, "the file has no [SECTION]; this is no weaving draft in WIF format");
   }

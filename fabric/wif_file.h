@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "fabric/draft_text.h"
+
 namespace weft::fabric {
 
 // A Weaving Information File as it stands: sections of "key=value" lines, each with its line
@@ -83,9 +85,8 @@ class WifFile {
   std::size_t current_ = 0;  // index into sections_, valid once there is one
 };
 
-// "[NAME]", and "3 ends".
+// "[NAME]".
 [[nodiscard]] std::string bracketed(std::string_view section);
-[[nodiscard]] std::string number_of(std::size_t count, const std::string& thing);
 
 // Largest file, in bytes and in lines, and most lines in the import report.
 inline constexpr std::uint64_t kMaxWifBytes = std::uint64_t{16} << 20;

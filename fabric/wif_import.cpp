@@ -255,7 +255,7 @@ ImportedDraft import_draft(const WifDraft& draft, const ImportOptions& options) 
   weft.radius_mm = radius_mm(draft.weft, "weft", widest, result.notes);
 
   std::string& text = result.text;
-  text = "# Made by weft import from " + plain(options.wif_reference) + ".\n";
+  text = "# Made by weft import from " + plain(options.draft_name) + ".\n";
   if (!draft.source_program.empty()) {
     text += "# The draft was written by " + plain(draft.source_program) + ".\n";
   }
@@ -266,6 +266,7 @@ ImportedDraft import_draft(const WifDraft& draft, const ImportOptions& options) 
   text += draft.title.empty() ? "" : "comment: \"" + plain(draft.title) + "\"\n";
   text += "weave {\n";
   const bool small = repeat.ends <= kMaxInlineThreads && repeat.picks <= kMaxInlineThreads;
+  result.refers = !small;
   text += small ? matrix_text(repeat, warp, weft) : reference_text(options);
   text += "  ends_per_cm: " + rounded(10 / warp_pitch) +
           "\n  picks_per_cm: " + rounded(10 / weft_pitch) + "\n";

@@ -10,7 +10,8 @@ namespace weft::fabric {
 
 struct ImportOptions {
   std::string name;           // of the fabric; is_name
-  std::string wif_reference;  // the draft's path as the description will name it
+  std::string draft_name;     // what the draft is called in the description's first comment
+  std::string wif_reference;  // path of the draft as WIF, as the description will name it
   v1::Crop crop;
   double fibre_share = 1;
 };
@@ -19,6 +20,7 @@ struct ImportOptions {
 struct ImportedDraft {
   std::string text;                // protobuf text of a FabricDescription, with comments
   std::vector<std::string> notes;  // the draft's own, then those of the import
+  bool refers = false;             // to options.wif_reference, for its repeat is too large
 };
 
 // Describes the cloth of a draft: its weave inline where it repeats within kMaxInlineThreads, else

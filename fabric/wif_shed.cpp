@@ -4,14 +4,13 @@
 #include <set>
 
 #include "fabric/draft.h"
+#include "fabric/shed.h"
 #include "fabric/wif_threads.h"
 
 namespace weft::fabric {
 namespace {
 
-using Lists = std::vector<std::vector<std::uint32_t>>;
-
-constexpr std::uint32_t kMaxShaftsPerEnd = 64;
+using Lists = NumberLists;
 
 // What a section of lists means: its keys are `things`, its values are numbers of `parts`.
 struct ListKind {
@@ -104,15 +103,7 @@ Lists moved_shafts(WifFile& file, std::uint32_t picks, std::uint32_t& shafts) {
     file.fail(line, "more than " + std::to_string(kMaxThreads) + " treadles");
   }
   const Lists tied = read_lists(file, {"TIEUP", "treadle", "shaft"}, treadles, shafts);
-  Lists moved(picks);
-  for (std::uint32_t pick = 0; pick < picks; ++pick) {
-    std::set<std::uint32_t> all;
-    for (const std::uint32_t treadle : pressed[pick]) {
-      all.insert(tied[treadle - 1].begin(), tied[treadle - 1].end());
-    }
-    moved[pick].assign(all.begin(), all.end());
-  }
-  return moved;
+  return moved_by_treadles(pressed, tied);
 }
 
 }  // namespace
@@ -152,19 +143,7 @@ void draw_down(WifFile& file, WifDraft& draft) {
                     std::to_string(kMaxShaftsPerEnd) + " are possible");
     }
   }
-  draft.up.assign(static_cast<std::size_t>(draft.warp.count) * draft.weft.count, 0);
-  std::vector<std::uint8_t> is_moved(std::size_t{shafts} + 1, 0);
-  for (std::uint32_t pick = 0; pick < draft.weft.count; ++pick) {
-    std::fill(is_moved.begin(), is_moved.end(), std::uint8_t{0});
-    for (const std::uint32_t shaft : moved[pick]) {
-      is_moved[shaft] = 1;
-    }
-    for (std::uint32_t end = 0; end < draft.warp.count; ++end) {
-      const bool any = std::any_of(threading[end].begin(), threading[end].end(),
-                                   [&](std::uint32_t shaft) { return is_moved[shaft] != 0; });
-      draft.up[static_cast<std::size_t>(pick) * draft.warp.count + end] = any == rising ? 1 : 0;
-    }
-  }
+  draw_down(Shed{threading, moved, rising}, draft);
 }
 
 }  // namespace weft::fabric

@@ -52,6 +52,64 @@ std::string small_wif() {
          "[TREADLING]\n1=1\n2=2\n3=3\n4=4\n[WARP COLORS]\n1=1\n2=2\n[WEFT SPACING]\n1=0.06\n";
 }
 
+std::string small_dtx() {
+  return "@@StartDTX\n%%version 1\n\n@@Description\ntwill\n\n@@Contents\nInfo\n\n"
+         "@@Info\n%%shafts 4 \n%%treadles 4\n%%ends 4\n%%picks 4\n\n@@Threading\n1 2 3 4\n\n"
+         "@@Tieup\n%%sinking\n0011\n0110\n1100\n1001\n\n@@Treadling\n%%compound\n1 2, 3 3 4\n\n"
+         "@@Color Palet\n255,255,255\n10,20,200\n\n@@Warp Colors\n0 0 1 1\n\n"
+         "@@Weft Spacing\n4 4 2 4\n\n@@EndDTX\n";
+}
+
+// A twill of one treadle a pick (fabric/wpo.h has the layout).
+std::string small_wpo() {
+  std::string bytes = {123, 7, 101, 4, 4, 4, 0, 0, 0, 20, 20, 0, 0, 0, 4, 0, 4};
+  bytes.append(7, '\0');
+  bytes += {0, 4, 1, 2, 3, 4, 0, 4, 0, 0, 1, 1, 0, 4, 1, 1, 1, 1};
+  bytes += {3, 6, 12, 9};
+  bytes += {0, 4, 1, 2, 3, 4};
+  bytes.append(66, '\0');
+  bytes += {2, '\xff', '\xff', '\xff', 10, 20, '\xc8'};
+  return bytes;
+}
+
+// A yarn that goes on in the next tile, and a ring.
+std::string small_bcc() {
+  std::string bytes = {'B', 'C', 'C', 0x44, 'C', '0', 3, 2, 2, 0, 0, 0, 0, 0, 0, 0, 6};
+  bytes.append(7 + 40, '\0');
+  const auto add = [&bytes](std::int32_t count, const std::vector<float>& points) {
+    bytes.append(reinterpret_cast<const char*>(&count), sizeof(count));
+    bytes.append(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(float));
+  };
+  add(3, {0, 0, 0, 1, 0.5f, 0.1f, 2, 0, 0});
+  add(-3, {0, 1, 0, 1, 1, 0, 1, 2, 0.2f});
+  return bytes;
+}
+
+// Binary glTF: a triangle with texture coordinates.
+std::string small_glb() {
+  std::string json =
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,)"
+      R"("scale":[1,-2,1]}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},)"
+      R"("indices":2}]}],"buffers":[{"byteLength":66}],"bufferViews":[{"buffer":0,"byteLength":36},)"
+      R"({"buffer":0,"byteOffset":36,"byteLength":24},{"buffer":0,"byteOffset":60,"byteLength":6}],)"
+      R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)"
+      R"({"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"},)"
+      R"({"bufferView":2,"componentType":5123,"count":3,"type":"SCALAR"}]})";
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  std::string data;
+  for (const float number :
+       {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 1.f, 1.f, 1.f, 0.f, 0.f}) {
+    data.append(reinterpret_cast<const char*>(&number), sizeof(number));
+  }
+  data += {0, 0, 1, 0, 2, 0, 0, 0};
+  const auto word = [](std::size_t value) {
+    const auto number = static_cast<std::uint32_t>(value);
+    return std::string(reinterpret_cast<const char*>(&number), sizeof(number));
+  };
+  return "glTF" + word(2) + word(28 + json.size() + data.size()) + word(json.size()) + "JSON" +
+         json + word(data.size()) + std::string("BIN\0", 4) + data;
+}
+
 void put_texts() {
   for (const char* name : {"tiny.textproto", "knit_jersey.textproto"}) {
     const std::filesystem::path path = source / "examples" / name;
@@ -63,6 +121,10 @@ void put_texts() {
       std::string(1, '\1') +
           R"({"name": "a", "weave": {"matrix": {"rows": ["10", "01"]}}, "yarns": [{"name": "y"}]})");
   put("wif", "twill.wif", small_wif());
+  put("wif", "twill.dtx", small_dtx());
+  put("wif", "twill.wpo", small_wpo());
+  put("bcc", "yarns.bcc", small_bcc());
+  put("gltf", "triangle.glb", small_glb());
   put("obj", "square.obj",
       "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n"
       "f 1/1/1 2/2/1 3/3/1 4/4/1\ng other\nf -4/-4 -3/-3 -2/-2\n");

@@ -123,10 +123,13 @@ std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics
 std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics,
                                       const FileSource& files, std::vector<std::string>& remarks) {
   const v1::ShellMesh& shell = cloth.shell();
-  ObjMesh mesh = read_obj_text(files(shell.obj_file()), shell.obj_file());
-  const double scale_mm = shell.mesh_scale_mm() > 0 ? shell.mesh_scale_mm() : 1;
+  ObjMesh mesh = read_mesh_text(files(shell.obj_file()), shell.obj_file());
+  const bool is_gltf = is_gltf_name(shell.obj_file());
+  const double otherwise_mm = is_gltf ? 1000 : 1;
+  const double scale_mm = shell.mesh_scale_mm() > 0 ? shell.mesh_scale_mm() : otherwise_mm;
   for (glm::dvec3& point : mesh.points) {
-    const glm::dvec3 upright = shell.y_up() ? glm::dvec3(point.x, -point.z, point.y) : point;
+    const glm::dvec3 upright =
+        shell.y_up() || is_gltf ? glm::dvec3(point.x, -point.z, point.y) : point;
     point = scale_mm * upright + vector_of(shell.move_mm());
   }
   ShellPlacement placement;

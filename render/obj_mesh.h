@@ -33,4 +33,11 @@ inline constexpr std::size_t kTriangleLimit = 4'000'000;
 // The same from memory; `name` stands for the file in messages.
 [[nodiscard]] ObjMesh read_obj_text(const std::string& text, const std::string& name);
 
+// Whether a file of this name is glTF, whose unit is the metre and whose y is up.
+[[nodiscard]] bool is_gltf_name(const std::string& name);
+
+// A mesh of the format that the name's extension tells: glTF 2.0 (.glb, .gltf, its buffers within
+// it), else OBJ. Throws as read_obj.
+[[nodiscard]] ObjMesh read_mesh_text(const std::string& bytes, const std::string& name);
+
 }  // namespace weft::render

@@ -27,11 +27,6 @@ float rolled_off(float value) {
   return 1 - room * std::exp(-(value - kShoulder) / room);
 }
 
-// IEC 61966-2-1.
-float srgb_encoded(float linear) {
-  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
-}
-
 void append(png_structp png, png_bytep data, png_size_t size) {
   auto* out = static_cast<std::string*>(png_get_io_ptr(png));
   out->append(reinterpret_cast<const char*>(data), size);
@@ -95,6 +90,64 @@ void write_png(const std::filesystem::path& path, std::uint32_t width, std::uint
     png_write_info(writer.png(), writer.info());
     for (std::uint32_t y = 0; y < height; ++y) {
       png_write_row(writer.png(), rgb.data() + std::size_t{3} * width * y);
+    }
+    png_write_end(writer.png(), writer.info());
+  }
+  core::write_file_atomically(path, bytes);
+}
+
+float srgb_encoded(float linear) {
+  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
+}
+
+void write_map_png(const std::filesystem::path& path, const MapPicture& picture, glm::vec2 size_mm,
+                   const std::map<std::string, std::string>& texts) {
+  const std::size_t row = std::size_t{picture.width} * picture.channels;
+  CHECK(picture.channels == 3 || picture.channels == 4);
+  CHECK(picture.bits == 8 || picture.bits == 16);
+  CHECK(size_mm.x > 0 && size_mm.y > 0);
+  CHECK_EQ(picture.values.size(), row * picture.height);
+  std::string bytes;
+  {
+    const PngWriter writer;
+    png_set_write_fn(writer.png(), &bytes, append, nullptr);
+    png_set_IHDR(writer.png(), writer.info(), picture.width, picture.height,
+                 static_cast<int>(picture.bits),
+                 picture.channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA,
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    if (picture.is_colour) {
+      png_set_sRGB_gAMA_and_cHRM(writer.png(), writer.info(), PNG_sRGB_INTENT_PERCEPTUAL);
+    }
+    const auto per_metre = [](std::uint32_t pixels, float mm) {
+      return static_cast<png_uint_32>(
+          std::lround(std::min(1000.0 * pixels / static_cast<double>(mm), 2e9)));
+    };
+    png_set_pHYs(writer.png(), writer.info(), per_metre(picture.width, size_mm.x),
+                 per_metre(picture.height, size_mm.y), PNG_RESOLUTION_METER);
+    for (const auto& [key, value] : texts) {
+      std::string own_key = key;
+      std::string own_value = value;
+      png_text text{};
+      text.compression = PNG_TEXT_COMPRESSION_NONE;
+      text.key = own_key.data();
+      text.text = own_value.data();
+      png_set_text(writer.png(), writer.info(), &text, 1);  // copied
+    }
+    png_write_info(writer.png(), writer.info());
+    const std::size_t value_bytes = picture.bits / 8;
+    const float greatest = picture.bits == 8 ? 255.0f : 65535.0f;
+    std::vector<std::uint8_t> packed(row * value_bytes);
+    for (std::uint32_t y = 0; y < picture.height; ++y) {
+      for (std::size_t i = 0; i < row; ++i) {
+        const float value = std::fmin(std::fmax(picture.values[y * row + i], 0.0f), 1.0f);
+        const auto number = static_cast<std::uint32_t>(std::lround(greatest * value));
+        packed[i * value_bytes] =
+            static_cast<std::uint8_t>(value_bytes == 1 ? number : number >> 8);  // big-endian
+        if (value_bytes == 2) {
+          packed[i * value_bytes + 1] = static_cast<std::uint8_t>(number & 0xff);
+        }
+      }
+      png_write_row(writer.png(), packed.data());
     }
     png_write_end(writer.png(), writer.info());
   }

@@ -2,10 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <glm/vec2.hpp>
 
 #include "render/image.h"
 
@@ -16,6 +19,26 @@ namespace weft::render {
 // core::Error(kUnavailable) when the file cannot be written.
 void write_png(const std::filesystem::path& path, std::uint32_t width, std::uint32_t height,
                std::span<const std::uint8_t> rgb);
+
+// A picture that measures a surface: each value is a share of the greatest.
+struct MapPicture {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t channels = 3;  // 3, or 4 with an alpha
+  std::uint32_t bits = 8;      // 8 or 16 are kept of each value
+  bool is_colour = false;      // sRGB (the alpha is linear); else numbers, to be left as they are
+  std::vector<float> values;   // [height, width, channels] in [0, 1], top row first
+};
+
+// Writes it as PNG, with its physical size (chunk pHYs) and texts. Values are clamped to [0, 1];
+// NaN becomes 0. Written beside and renamed; the bytes depend on nothing but the arguments.
+// REQUIRES: as many values as the sides say, and a positive size. Throws
+// core::Error(kUnavailable) when the file cannot be written.
+void write_map_png(const std::filesystem::path& path, const MapPicture& picture, glm::vec2 size_mm,
+                   const std::map<std::string, std::string>& texts);
+
+// A linear value as sRGB has it (IEC 61966-2-1).
+[[nodiscard]] float srgb_encoded(float linear);
 
 // A picture of numbers: of the colours in a palette, or grey levels as they are stored.
 struct PlainPicture {

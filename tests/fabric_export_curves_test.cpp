@@ -85,7 +85,7 @@ TEST(ExportCurves, ObjReadsBackToTheLastBit) {
     }
   }
   EXPECT_EQ(vertices, tile.points_mm);
-  const std::vector<std::vector<std::size_t>> expected = {{1, 2, 3}, {4, 5}};
+  const std::vector<std::vector<std::size_t>> expected = {{1, 2}, {2, 3}, {4, 5}};
   EXPECT_EQ(polylines, expected);
 }
 
@@ -126,6 +126,24 @@ TEST(ExportCurves, RefusesNothingAndTooMuch) {
   EXPECT_THROW((void)export_curves(small_tile(), {CurveFormat::kBcc, {0, 1}, {}}), core::Error);
   EXPECT_THROW((void)export_curves(small_tile(), {CurveFormat::kBcc, {20000, 20000}, {}}),
                core::Error);
+}
+
+TEST(ExportCurves, UsdaHasAPrimForEachMaterial) {
+  const std::string text =
+      export_curves(small_tile(), {CurveFormat::kUsda, {2, 1}, {{0.5F, 0, 0}, {0, 0, 2}}});
+  EXPECT_EQ(text.substr(0, 10), "#usda 1.0\n");
+  const auto has = [&text](const std::string& part) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
+  };
+  has("metersPerUnit = 0.001\n    upAxis = \"Z\"");
+  has("def BasisCurves \"material_0_red\"");
+  has("int[] curveVertexCounts = [3, 3]");
+  has("float[] widths = [0.0199999996, 0.0199999996] (");
+  has("color3f[] primvars:displayColor = [(0.5, 0, 0)]");
+  has("def BasisCurves \"material_1_blue\"");
+  has("point3f[] points = [(0, 0.699999988, 0), (2, 0.699999988, 0), (2, 0.699999988, 0), (4, "
+      "0.699999988, 0)]");
+  has("(0, 0, 1)]");  // colours end at 1
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ const char* const kStripes =
 ImportOptions options() {
   ImportOptions result;
   result.name = "stripes";
+  result.draft_name = "stripes.wif";
   result.wif_reference = "stripes.wif";
   return result;
 }
@@ -94,6 +95,7 @@ TEST(WifImport, RealDraftsMakeDescriptionsThatLoad) {
     }
     ImportOptions from_file = options();
     from_file.name = name_from_file(entry.path().stem().string());
+    from_file.draft_name = entry.path().string();
     from_file.wif_reference = entry.path().string();
     const WifDraft draft = read_wif(core::read_file(entry.path()), entry.path().string());
     const v1::FabricDescription fabric = load(import_draft(draft, from_file));

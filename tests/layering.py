@@ -36,6 +36,7 @@ BEHIND = {
     r"vulkan/.*": {"render/gpu/vulkan.h"},
     r"sqlite3\.h": {"coordinator/journal/sqlite.cpp"},
     r"tiny_obj_loader\.h": {"render/files/obj_parser.cpp"},
+    r"tiny_gltf\.h": {"render/files/gltf_parser.cpp"},
     r"openssl/.*": {"core/digest.cpp", "security/x509.cpp", "security/tls_probe.cpp",
                      "security/web_gate.cpp"},
     r"httplib\.h": {"coordinator/web/http_server.cpp"},

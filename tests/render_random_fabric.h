@@ -17,6 +17,7 @@ struct RandomFabric {
   std::uint32_t gaussians = 12;
   std::uint32_t components = 4;
   float sigma_shadow_mm = 0.2f;
+  std::uint32_t materials = 2;  // or 1; whose tables take a second each
 };
 
 inline shading::FibreMaterial random_material(core::Random& random) {
@@ -43,12 +44,11 @@ inline storage::FabricDatabase random_database(const RandomFabric& wanted) {
   storage::FabricDatabase db;
   db.size_mm = {1, 1};
   db.z_bounds_mm = {-0.08f, 0.08f};
-  db.material_names = {"first", "second"};
   db.yarn_names = {"yarn"};
   db.threads = {0, 3, 0};
   for (std::uint32_t layer = 0; layer < 2; ++layer) {
     for (std::uint32_t k = 0; k < kFibres; ++k) {
-      db.strands.insert(db.strands.end(), {kSegments + 1, (layer + k) % 2, 0});
+      db.strands.insert(db.strands.end(), {kSegments + 1, (layer + k) % wanted.materials, 0});
       db.strand_periods.insert(db.strand_periods.end(), {layer == 0 ? 1 : 0, layer == 0 ? 0 : 1});
       db.strand_radius_mm.push_back(0.04f);
       for (std::uint32_t i = 0; i <= kSegments; ++i) {
@@ -61,7 +61,10 @@ inline storage::FabricDatabase random_database(const RandomFabric& wanted) {
     }
   }
   const std::uint32_t segments = 2 * kFibres * kSegments;
-  db.materials = {random_material(random), random_material(random)};
+  for (std::uint32_t k = 0; k < wanted.materials; ++k) {
+    db.material_names.push_back(k == 0 ? "first" : "second");
+    db.materials.push_back(random_material(random));
+  }
   for (const shading::FibreMaterial& material : db.materials) {
     const std::vector<float> table =
         shading::bcsdf_sh_table(material, static_cast<int>(wanted.order));

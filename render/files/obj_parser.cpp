@@ -20,11 +20,6 @@ static_assert(sizeof(glm::dvec3) == 24 && sizeof(ObjMesh::Triangle) == 64,
   throw core::Error(code, name + ": " + what);
 }
 
-// Not for what is no number, either.
-bool is_usable(double value) { return std::fabs(value) <= kCoordinateLimit; }
-bool is_usable(const glm::dvec3& v) { return is_usable(v.x) && is_usable(v.y) && is_usable(v.z); }
-bool is_usable(const glm::dvec2& v) { return is_usable(v.x) && is_usable(v.y); }
-
 void take_points(const tinyobj::attrib_t& attributes, const std::string& name, ObjMesh& mesh) {
   if (attributes.vertices.size() / 3 > kPointLimit) {
     refuse(name, "more than " + std::to_string(kPointLimit) + " points; use a coarser mesh",
@@ -80,6 +75,17 @@ std::vector<Item> items_from(std::span<const std::byte> bytes, std::size_t limit
 
 }  // namespace
 
+bool is_usable(double value) { return std::fabs(value) <= kCoordinateLimit; }
+bool is_usable(const glm::dvec3& point) {
+  return is_usable(point.x) && is_usable(point.y) && is_usable(point.z);
+}
+bool is_usable(const glm::dvec2& place) { return is_usable(place.x) && is_usable(place.y); }
+
+void hand_over(const ObjMesh& mesh, core::FlatWriter& answer) {
+  answer.bytes(std::as_bytes(std::span(mesh.points)));
+  answer.bytes(std::as_bytes(std::span(mesh.triangles)));
+}
+
 ObjMesh parse_obj(const std::string& text, const std::string& name) {
   tinyobj::ObjReader reader;
   tinyobj::ObjReaderConfig config;
@@ -118,9 +124,7 @@ core::SandboxHandler obj_handler() {
           [](std::span<const std::byte> file, const std::vector<std::string>& arguments,
              core::FlatWriter& answer) {
             const std::string text(reinterpret_cast<const char*>(file.data()), file.size());
-            const ObjMesh mesh = parse_obj(text, arguments.at(0));
-            answer.bytes(std::as_bytes(std::span(mesh.points)));
-            answer.bytes(std::as_bytes(std::span(mesh.triangles)));
+            hand_over(parse_obj(text, arguments.at(0)), answer);
           }};
 }
 

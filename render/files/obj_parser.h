@@ -18,6 +18,14 @@ inline constexpr double kCoordinateLimit = 1e9;
 // Throws as read_obj.
 [[nodiscard]] ObjMesh parse_obj(const std::string& text, const std::string& name);
 
+// What no parser of meshes lets through; not what is no number, either.
+[[nodiscard]] bool is_usable(double value);
+[[nodiscard]] bool is_usable(const glm::dvec3& point);
+[[nodiscard]] bool is_usable(const glm::dvec2& place);
+
+// Writes a mesh as mesh_from reads it.
+void hand_over(const ObjMesh& mesh, core::FlatWriter& answer);
+
 // The sandbox's half of read_obj.
 [[nodiscard]] core::SandboxHandler obj_handler();
 // What the handler hands back, checked. Throws core::Error(kDataLoss) when it is not whole.

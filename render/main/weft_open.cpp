@@ -2,6 +2,7 @@
 
 #include "core/sandbox_child.h"
 #include "render/files/exr_parser.h"
+#include "render/files/gltf_parser.h"
 #include "render/files/obj_parser.h"
 #include "render/files/png_parser.h"
 #include "storage/database_parser.h"
@@ -12,6 +13,7 @@ int main(int argc, char** argv) {
       core::serve_sandbox(argc, argv,
                           {{weft::storage::kDatabaseRequest, weft::storage::database_handler()},
                            {weft::render::kExrRequest, weft::render::exr_handler()},
+                           {weft::render::kGltfRequest, weft::render::gltf_handler()},
                            {weft::render::kObjRequest, weft::render::obj_handler()},
                            {weft::render::kPngRequest, weft::render::png_handler()}});
   std::fputs(
