@@ -1,9 +1,19 @@
 #!/usr/bin/env bash
 # Installs what weft is built from and tested with: the Debian 12 packages in deploy/packages.txt.
+# --without-tests leaves out what tests alone need (browsers, Blender, Slurm, ...).
 # Does nothing, and needs no rights, when all of them are there.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-mapfile -t packages < <(grep -vE '^\s*(#|$)' "$here/packages.txt")
+
+last='$'
+for argument in "$@"; do
+  case "$argument" in
+    --without-tests) last='/^# ---- tests:/' ;;
+    -h | --help) sed -n '2,4s/^# //p' "$0"; exit 0 ;;
+    *) echo "install_packages.sh: unknown argument '$argument'; it takes --without-tests" >&2; exit 2 ;;
+  esac
+done
+mapfile -t packages < <(sed -n "1,${last}p" "$here/packages.txt" | grep -vE '^\s*(#|$)')
 
 missing=()
 for package in "${packages[@]}"; do

@@ -14,6 +14,7 @@ for argument in "$@"; do
   esac
 done
 
+[ "$build_only" -eq 1 ] || deploy/install_packages.sh
 deploy/build.sh
 [ "$build_only" -eq 0 ] || exit 0
 
