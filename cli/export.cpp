@@ -10,6 +10,7 @@
 #include "cli/add_command.h"
 #include "cli/commands.h"
 #include "cli/fibre_colours.h"
+#include "cli/output_file.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
 #include "cli/quality.h"
@@ -44,8 +45,8 @@ glm::uvec2 parse_tiles(const std::string& text) {
   // At most four digits each, so that nothing overflows.
   if (std::sscanf(text.c_str(), "%4ux%4u%n", &x, &y, &used) != 2 ||
       used != static_cast<int>(text.size()) || x == 0 || y == 0 || text[0] < '0') {
-    throw core::Error(core::Code::kInvalidArgument,
-                      "--tiles " + text + " is not a number of tiles; write for example 3x2");
+    throw CLI::ValidationError("--tiles",
+                               text + " is not a number of tiles; write for example 3x2");
   }
   return {x, y};
 }
@@ -58,9 +59,8 @@ fabric::CurveFormat format_of(const CommandOptions& options) {
   }
   const auto found = kFormats.find(name);
   if (found == kFormats.end()) {
-    throw core::Error(core::Code::kInvalidArgument,
-                      "the name '" + options.out +
-                          "' does not tell the format; give --format pbrt, bcc, obj or usda");
+    throw CLI::ValidationError(
+        "--format", "the name '" + options.out + "' does not tell it; give pbrt, bcc, obj or usda");
   }
   return found->second;
 }
@@ -69,6 +69,7 @@ void export_fabric(const CommandOptions& options) {
   fabric::ExportOptions export_options;
   export_options.format = format_of(options);
   export_options.tiles = parse_tiles(options.tiles);
+  check_output_file(options.out);
   const v1::FabricDescription description =
       fabric::load_description(options.fabric, parse_quality(options.quality));
   const fabric::Tile tile = fabric::build_tile(description);

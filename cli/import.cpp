@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -65,10 +66,9 @@ Range parse_range(const std::string& text, const std::string& flag) {
                                : std::from_chars_result{end, std::errc::invalid_argument};
   if (first.ec != std::errc() || first.ptr != begin + colon || count.ec != std::errc() ||
       count.ptr != end || range.first == 0 || range.count == 0) {
-    throw core::Error(core::Code::kInvalidArgument,
-                      flag + " " + text +
-                          " is no range; write A:N for N threads from A on, "
-                          "counted from 1, such as 1:24");
+    throw CLI::ValidationError(flag, text +
+                                         " is no range; write A:N for N threads from A on, "
+                                         "counted from 1, such as 1:24");
   }
   return range;
 }
@@ -181,6 +181,23 @@ void print_report(const ImportCommand& command, const fabric::WifDraft& draft,
   }
 }
 
+// Options that go with drafts alone, and with curves alone.
+struct KindOptions {
+  std::vector<const CLI::Option*> of_drafts;
+  std::vector<const CLI::Option*> of_curves;
+};
+
+void refuse_options_of_the_other_kind(const ImportCommand& command, const KindOptions& options) {
+  const bool curves = holds_curves(command.draft);
+  for (const CLI::Option* option : curves ? options.of_drafts : options.of_curves) {
+    if (option->count() > 0) {
+      throw CLI::ValidationError(option->get_name(),
+                                 curves ? "it is for drafts, and a .bcc file holds curves"
+                                        : "it is for curves (.bcc), and this file is a draft");
+    }
+  }
+}
+
 void import(const ImportCommand& command) {
   if (holds_curves(command.draft)) {
     CurveImport curves = command.curves;
@@ -234,30 +251,35 @@ void add_import(CLI::App& app) {
       ->required();
   import_app->add_option("-o,--out", command->out, "Description to write (.textproto)")->required();
   import_app->add_option("--name", command->name, "Name of the fabric (default: the file's)");
-  import_app->add_option("--crop-ends", command->crop_ends,
-                         "A:N, only N ends from end A on, counted from 1");
-  import_app->add_option("--crop-picks", command->crop_picks,
-                         "A:N, only N picks from pick A on, counted from 1");
-  import_app
-      ->add_option("--fibre-share", command->fibre_share,
-                   "Make only this share of the fibres, thicker")
-      ->check(CLI::Range(0.001, 1.0))
-      ->capture_default_str();
+  KindOptions kinds;
+  kinds.of_drafts = {import_app->add_option("--crop-ends", command->crop_ends,
+                                            "A:N, only N ends from end A on, counted from 1"),
+                     import_app->add_option("--crop-picks", command->crop_picks,
+                                            "A:N, only N picks from pick A on, counted from 1"),
+                     import_app
+                         ->add_option("--fibre-share", command->fibre_share,
+                                      "Make only this share of the fibres, thicker")
+                         ->check(CLI::Range(0.001, 1.0))
+                         ->capture_default_str()};
   CurveImport& curves = command->curves;
-  import_app->add_option("--period", curves.period,
-                         "Curves: X,Y millimetres after which they repeat");
-  import_app->add_option("--as", curves.as, "Curves: centre lines of yarns, or single fibres")
-      ->check(CLI::IsMember({"yarns", "fibres"}))
-      ->capture_default_str();
-  import_app
-      ->add_option("--unit-mm", curves.mm_per_unit, "Curves: millimetres per unit of the file")
-      ->check(CLI::Range(1e-6, 1e6))
-      ->capture_default_str();
-  import_app->add_option("--radius-mm", curves.radius_mm, "Curves: of the yarns or fibres")
-      ->check(CLI::Range(1e-4, 1e3))
-      ->capture_default_str();
+  kinds.of_curves = {
+      import_app->add_option("--period", curves.period,
+                             "Curves: X,Y millimetres after which they repeat"),
+      import_app->add_option("--as", curves.as, "Curves: centre lines of yarns, or single fibres")
+          ->check(CLI::IsMember({"yarns", "fibres"}))
+          ->capture_default_str(),
+      import_app
+          ->add_option("--unit-mm", curves.mm_per_unit, "Curves: millimetres per unit of the file")
+          ->check(CLI::Range(1e-6, 1e6))
+          ->capture_default_str(),
+      import_app->add_option("--radius-mm", curves.radius_mm, "Curves: of the yarns or fibres")
+          ->check(CLI::Range(1e-4, 1e3))
+          ->capture_default_str()};
   import_app->add_flag("--json", command->json, "Print one JSON value");
-  import_app->callback([command] { import(*command); });
+  import_app->callback([command, kinds] {
+    refuse_options_of_the_other_kind(*command, kinds);
+    import(*command);
+  });
 }
 
 }  // namespace weft::cli

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <google/protobuf/text_format.h>
 
@@ -27,7 +28,8 @@ namespace {
 
 glm::dvec2 parse_period(const std::string& text) {
   if (text.empty()) {
-    refuse("curves do not say where they repeat; give --period X,Y, in millimetres");
+    throw CLI::ValidationError(
+        "--period", "curves do not say where they repeat; give it as X,Y, in millimetres");
   }
   glm::dvec2 period(0);
   const std::size_t comma = std::min(text.find(','), text.size());
@@ -37,7 +39,7 @@ glm::dvec2 parse_period(const std::string& text) {
   };
   if (comma >= text.size() || !number(0, comma, period.x) ||
       !number(comma + 1, text.size(), period.y)) {
-    refuse("--period " + text + " is not two lengths; write for example 4.2,3.5");
+    throw CLI::ValidationError("--period", text + " is not two lengths; write for example 4.2,3.5");
   }
   return period;
 }

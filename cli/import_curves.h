@@ -21,7 +21,7 @@ struct CurveImport {
 
 // Writes a description of the cloth that the curves make when they are repeated: of yarns, beside a
 // pattern (.pyp) that it names, or of fibres. Throws core::Error(kInvalidArgument) when a yarn ends
-// within the cloth, or the period is missing.
+// within the cloth, CLI::ValidationError when the period is missing or is none.
 void import_curves(const CurveImport& wanted);
 
 }  // namespace weft::cli

@@ -62,8 +62,8 @@ core::Clock::Time time_of_making() {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
   if (error != std::errc() || end != text.data() + text.size() || seconds < 0 ||
       seconds > 253'402'300'799) {
-    throw core::Error(core::Code::kInvalidArgument,
-                      "SOURCE_DATE_EPOCH is '" + text + "'; it must be seconds since 1970");
+    throw CLI::ValidationError("SOURCE_DATE_EPOCH",
+                               "it is '" + text + "' and must be seconds since 1970");
   }
   return core::Clock::Time(std::chrono::seconds(seconds));
 }
@@ -156,6 +156,7 @@ void add_maps(CLI::App& app) {
   CLI::App* command = add_command(app, "maps", kHelp);
   command->add_option("fabric", options->fabric, "Database (.h5) or published version")->required();
   command->add_option("-o,--output", options->out, "Folder to write into; made when missing")
+      ->option_text("FOLDER")
       ->required();
   command->add_option("--size", options->size, "Pixels of the tile's longer side")
       ->check(CLI::Range(8U, kSizeLimit))

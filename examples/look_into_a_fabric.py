@@ -41,19 +41,20 @@ def save(figure, file, what):
 
 
 # ---------------------------------------------------------------- what pieces of fibre see of the sky
-# The upper half of the sphere of directions, straight up in the middle, the horizon at the rim. Four
-# segments from almost hidden to almost open.
+# The upper half of the sphere of directions, straight up in the middle, the horizon at the rim. Of 300
+# segments spread over the tile, four from almost hidden to almost open.
 
-share = fabric["visibility/open_share"].astype(float)
 theta, phi = fabric["visibility/theta"], fabric["visibility/phi"]
 upper = theta < np.pi / 2
-partly = np.flatnonzero((share > 0.02) & (share < 1))
-order = partly[np.argsort(share[partly])]
-chosen = order[(np.array([0.25, 0.5, 0.75, 0.98]) * (len(order) - 1)).astype(int)]
+solid_angle = np.sin(theta[upper]) / np.sin(theta[upper]).sum()
+segments = np.unique(np.linspace(0, len(fabric["visibility/open_share"]) - 1, 300).astype(int))
+share = np.array([solid_angle @ fabric.visibility(k)[upper].mean(axis=1) for k in segments])
+order = np.argsort(share)[np.sort(share) > 0.01]
+chosen = order[(np.array([0.2, 0.5, 0.8, 1]) * (len(order) - 1)).astype(int)]
 
 figure, axes = plt.subplots(1, 4, figsize=(14, 4), subplot_kw={"projection": "polar"},
                             layout="constrained")
-for axis, segment in zip(axes, chosen):
+for axis, segment, seen in zip(axes, segments[chosen], share[chosen]):
     distance = fabric.signed_distance(segment)[upper]
     step = phi[1] - phi[0]
     edges = np.append(phi, phi[-1] + step) - step / 2
@@ -65,7 +66,7 @@ for axis, segment in zip(axes, chosen):
     if distance.min() < 0 < distance.max():
         axis.contour(np.append(phi, phi[0] + 2 * np.pi), np.degrees(theta[upper]), closed,
                      levels=[0], colors="black", linewidths=1)
-    axis.set_title(f"segment {segment}\nsees {100 * share[segment]:.1f} % of the sphere", fontsize=10)
+    axis.set_title(f"segment {segment}\nsees {100 * seen:.1f} % of the sky", fontsize=10)
     axis.set_yticks([30, 60, 90], ["30°", "60°", ""], fontsize=7)
     axis.set_xticks(np.radians([0, 90, 180, 270]), ["across", "along", "", ""], fontsize=8)
     axis.grid(alpha=0.4)

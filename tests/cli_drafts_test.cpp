@@ -105,5 +105,34 @@ TEST_F(Drafts, ABrokenDraftOrCropIsRefusedAndWritesNothing) {
   EXPECT_EQ(weft("import " + path("none.wif") + " -o " + path("f.textproto")).code, 3);
 }
 
+TEST_F(Drafts, OptionsOfTheOtherKindOfFileAreWrongUse) {
+  core::write_file_atomically(path("plain.wif"), kPlain);
+  const std::string curves = std::string(WEFT_SOURCE_DIR) + "/fuzz/corpus/bcc/yarns.bcc";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {path("plain.wif") + " --period 1,1", "--period: it is for curves (.bcc)"},
+      {curves + " --period 2,2 --fibre-share 0.5", "--fibre-share: it is for drafts"},
+      {curves, "--period: curves do not say where they repeat; give it as X,Y"},
+      {curves + " --period 2", "--period: 2 is not two lengths; write for example 4.2,3.5"},
+      {path("plain.wif") + " --crop-picks 0:2", "--crop-picks: 0:2 is no range"}};
+  for (const auto& [arguments, expected] : cases) {
+    const Outcome outcome = weft("import " + arguments + " -o " + path("o.textproto"));
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.text, HasSubstr(expected));
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("o.textproto")));
+  EXPECT_EQ(weft("import " + curves + " --period 2,2 --as fibres -o " + path("o.textproto")).code,
+            0);
+}
+
+TEST_F(Drafts, WrongUseOfExportIsSaid) {
+  const std::string export_tiny =
+      "export " + std::string(WEFT_SOURCE_DIR) + "/examples/tiny.textproto -o ";
+  const Outcome ending = weft(export_tiny + path("fibres.xyz"));
+  EXPECT_EQ(ending.code, 2);
+  EXPECT_THAT(ending.text, HasSubstr("fibres.xyz' does not tell it; give pbrt, bcc, obj or usda"));
+  EXPECT_EQ(weft(export_tiny + path("fibres.obj") + " --tiles 0x1").code, 2);
+  EXPECT_EQ(weft(export_tiny + path("none/fibres.obj")).code, 3);
+}
+
 }  // namespace
 }  // namespace weft::cli

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdlib>
 #include <string>
 #include <vector>
@@ -7,6 +8,7 @@
 
 #include "cli/textile_facts.h"
 #include "render/image.h"
+#include "render/obj_mesh.h"
 #include "tests/cli_programs.h"
 
 // Files that weft writes, opened by software that is not ours.
@@ -70,15 +72,15 @@ class WrittenFiles : public ::testing::Test {
 };
 std::unique_ptr<TestFolder> WrittenFiles::folder_;
 
-TEST_F(WrittenFiles, BlenderOpensFibresAndTheMaterial) {
+TEST_F(WrittenFiles, BlenderOpensFibresAndTheMaterialAndItsOwnMeshIsRead) {
   if (!has("blender --version")) {
     GTEST_SKIP() << "there is no blender";
   }
   const json counts = exported("fibres.obj");
   output_of(folder(), {"blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python",
                        WEFT_SOURCE_DIR "/tests/open_elsewhere.py", "--", at("found.json"),
-                       at("fibres.obj"), at("maps/tiny.gltf")});
-  const json found = json::parse(core::read_file(at("found.json")))["files"];
+                       at("grid.glb"), at("fibres.obj"), at("maps/tiny.gltf")});
+  const json found = json::parse(core::read_file(at("found.json")));
   const json& fibres = found["fibres.obj"];
   const auto curves = counts["curves"].get<std::uint64_t>();
   const auto segments = counts["segments"].get<std::uint64_t>();
@@ -96,6 +98,24 @@ TEST_F(WrittenFiles, BlenderOpensFibresAndTheMaterial) {
   const double repeats = material["uv"][0][1].get<double>() - material["uv"][0][0].get<double>();
   EXPECT_NEAR(repeats, std::round(repeats), 1e-4);
   EXPECT_NEAR(material["size"][0].get<double>(), 0.1, 0.01);
+
+  // Metres, y up; the node scales.
+  const render::ObjMesh grid = render::read_mesh_text(core::read_file(at("grid.glb")), "grid.glb");
+  EXPECT_EQ(grid.points.size(), 20U);
+  ASSERT_EQ(grid.triangles.size(), 24U);
+  for (const glm::dvec3& point : grid.points) {
+    EXPECT_NEAR(point.y, 0.5, 1e-6);
+    EXPECT_LE(std::fabs(point.x), 0.1 + 1e-6);
+    EXPECT_LE(std::fabs(point.z), 0.05 + 1e-6);
+  }
+  for (const render::ObjMesh::Triangle& triangle : grid.triangles) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      // Blender's texture runs with x and against glTF's z.
+      const glm::dvec3& point = grid.points[triangle.points[corner]];
+      EXPECT_NEAR(triangle.texture[corner].x, point.x / 0.2 + 0.5, 1e-5);
+      EXPECT_NEAR(triangle.texture[corner].y, 0.5 - point.z / 0.1, 1e-5);
+    }
+  }
 }
 
 TEST_F(WrittenFiles, TheU3mFileKeepsItsSchemaAndUsdaItsCounts) {

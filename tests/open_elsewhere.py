@@ -1,6 +1,7 @@
-"""What Blender makes of files that weft wrote: blender -b --python open_elsewhere.py -- OUT FILE...
+"""What Blender makes of files that weft wrote: blender -b --python open_elsewhere.py -- OUT MESH FILE...
 
-Opens OBJ and glTF files, all in one start, and writes what it found as JSON to OUT.
+Opens OBJ and glTF files, all in one start, and writes what it found as JSON to OUT. Writes a mesh of
+its own as binary glTF to MESH.
 """
 
 import json
@@ -48,7 +49,15 @@ def opened(path):
     return found
 
 
-arguments = sys.argv[sys.argv.index("--") + 1:]
-with open(arguments[0], "w") as out:
-    json.dump({"usd": hasattr(bpy.ops.wm, "usd_import") and bpy.app.build_options.usd,
-               "files": {os.path.basename(path): opened(path) for path in arguments[1:]}}, out)
+def write_mesh(path):
+    """A grid of 4 by 3 squares, 200 mm by 100 mm, half a metre above the ground, its node scaled."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=4, y_subdivisions=3, size=0.2, location=(0, 0, 0.5))
+    bpy.context.object.scale = (1, 0.5, 1)
+    bpy.ops.export_scene.gltf(filepath=path, export_format="GLB")
+
+
+found_in, mesh, *files = sys.argv[sys.argv.index("--") + 1:]
+with open(found_in, "w") as out:
+    json.dump({os.path.basename(path): opened(path) for path in files}, out)
+write_mesh(mesh)

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -257,6 +258,24 @@ TEST(ObjMesh, ReadsPolygonsAndRefusesWhatHasNoTexture) {
   }
   EXPECT_THROW(static_cast<void>(read_obj(folder / "absent.obj")), core::Error);
   std::filesystem::remove_all(folder);
+}
+
+TEST(ObjMesh, RealMeshesLoad) {
+  const char* data = std::getenv("WEFT_SHARED_DATA");
+  const auto folder = std::filesystem::path(data == nullptr ? "" : data) / "meshes";
+  if (data == nullptr || !std::filesystem::is_directory(folder)) {
+    GTEST_SKIP() << "WEFT_SHARED_DATA does not name a folder with meshes/";
+  }
+  std::size_t meshes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".obj") {
+      const ObjMesh mesh = read_obj(entry.path());
+      EXPECT_GT(mesh.triangles.size(), 1000U) << entry.path();
+      EXPECT_GT(mesh.points.size(), 500U) << entry.path();
+      ++meshes;
+    }
+  }
+  EXPECT_GT(meshes, 0U) << folder;
 }
 
 }  // namespace

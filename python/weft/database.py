@@ -1,5 +1,6 @@
 """A fabric database as numpy arrays (docs/database_format.md says what each of them is)."""
 
+import functools
 import json
 
 import h5py
@@ -60,11 +61,15 @@ class Database:
         Rows are the polar angle from straight up, columns the azimuth. Positive: the sky is visible.
         """
         share = float(self.file["visibility/open_share"][segment])
-        mean = self["visibility/ssdf/mean"]
+        mean, basis = self._ssdf
         if share in (0.0, 1.0):
             return numpy.full(mean.shape, numpy.pi if share == 1.0 else -numpy.pi)
         weights = self.file["visibility/ssdf/coefficients"][segment].astype(float)
-        return mean + numpy.tensordot(weights, self["visibility/ssdf/basis"].astype(float), 1)
+        return mean + numpy.tensordot(weights, basis, 1)
+
+    @functools.cached_property
+    def _ssdf(self):
+        return self["visibility/ssdf/mean"], self["visibility/ssdf/basis"].astype(float)
 
     def visibility(self, segment):
         """What a segment sees of the sky: booleans [resolution, resolution], as signed_distance."""

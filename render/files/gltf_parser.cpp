@@ -45,7 +45,7 @@ class Numbers {
   // `components`: of each element.
   Numbers(const tinygltf::Model& model, int accessor, std::size_t components,
           const std::string& name)
-      : components_(components), name_(name) {
+      : name_(name) {
     const tinygltf::Accessor& about = item(model.accessors, accessor, name, "accessor");
     if (about.sparse.isSparse || about.bufferView < 0) {
       refuse(name, "an accessor is sparse or has no data; export the mesh without");
@@ -115,7 +115,6 @@ class Numbers {
   }
 
   const unsigned char* data_ = nullptr;
-  std::size_t components_;
   const std::string& name_;
   std::size_t count_ = 0;
   std::size_t stride_ = 0;
