@@ -6,11 +6,9 @@ set -euo pipefail
 bin=$(cd "$1" && pwd)
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
-for program in slurmctld slurmd munged sbatch squeue; do
-  PATH=$PATH:/usr/sbin command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
-done
-[ "$(id -u)" -eq 0 ] || { echo "skipped: slurmd runs jobs as others and wants root"; exit 77; }
-PATH=$PATH:/usr/sbin
+. "$source_dir/tests/slurm_cluster.sh"
+missing=$(slurm_is_missing)
+[ -z "$missing" ] || { echo "skipped: $missing"; exit 77; }
 
 folder=$(mktemp -d "${TMPDIR:-/tmp}/weft-slurm.XXXXXX")
 pids=()
@@ -19,70 +17,14 @@ stop() {
   for pid in "${pids[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
   for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null || true; done
   if [ "$status" -ne 0 ]; then
-    tail -n 20 "$folder"/*.log >&2 || true
+    tail -n 20 "$folder"/*.log "$folder"/slurm/*.log >&2 || true
   fi
   rm -rf "$folder"
 }
 trap stop EXIT
 
-until_holds() {  # SECONDS WHAT COMMAND...
-  local seconds=$1 what=$2
-  shift 2
-  for _ in $(seq $((seconds * 5))); do
-    if "$@" >/dev/null 2>&1; then return 0; fi
-    sleep 0.2
-  done
-  echo "slurm.sh: $what: not within $seconds s" >&2
-  return 1
-}
-
-free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
-
-# Munge refuses sockets and keys that others could have written.
-chmod 755 "$folder"
-mkdir "$folder/munge" "$folder/state" "$folder/spool"
-dd if=/dev/urandom of="$folder/munge/key" bs=1024 count=1 status=none
-chmod 400 "$folder/munge/key"
-munged --foreground --force --key-file="$folder/munge/key" --socket="$folder/munge/socket" \
-  --pid-file="$folder/munge/pid" --seed-file="$folder/munge/seed" \
-  --log-file="$folder/munge/munged.log" >"$folder/munged.log" 2>&1 &
-pids+=($!)
-until_holds 20 "munged listens" test -S "$folder/munge/socket"
-
-host=$(hostname -s)
-cat >"$folder/slurm.conf" <<CONF
-ClusterName=weft
-SlurmctldHost=$host(127.0.0.1)
-SlurmctldPort=$(free_port)
-SlurmdPort=$(free_port)
-SlurmUser=root
-SlurmdUser=root
-AuthType=auth/munge
-AuthInfo=socket=$folder/munge/socket
-CredType=cred/munge
-StateSaveLocation=$folder/state
-SlurmdSpoolDir=$folder/spool
-SlurmctldPidFile=$folder/slurmctld.pid
-SlurmdPidFile=$folder/slurmd.pid
-ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-JobAcctGatherType=jobacct_gather/none
-SelectType=select/cons_tres
-SelectTypeParameters=CR_CPU
-SchedulerParameters=sched_interval=1
-ReturnToService=2
-MpiDefault=none
-KillWait=5
-MessageTimeout=60
-NodeName=$host NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
-PartitionName=all Nodes=$host Default=YES MaxTime=INFINITE State=UP
-CONF
-export SLURM_CONF=$folder/slurm.conf
-slurmctld -D -f "$SLURM_CONF" >"$folder/slurmctld.log" 2>&1 &
-pids+=($!)
-slurmd -D -N "$host" -f "$SLURM_CONF" >"$folder/slurmd.log" 2>&1 &
-pids+=($!)
-until_holds 60 "a node is idle" sh -c 'sinfo --noheader --format=%T | grep -qx idle'
+start_slurm "$folder/slurm"
+pids+=("${slurm_pids[@]}")
 
 port=$(free_port)
 export WEFT_COORDINATOR=127.0.0.1:$port
