@@ -13,6 +13,8 @@ namespace {
 
 constexpr int kFloat = 5126;
 constexpr int kUnsignedShort = 5123;
+constexpr int kVertices = 34962;
+constexpr int kElements = 34963;
 constexpr int kRepeat = 10497;
 constexpr int kLinear = 9729;
 constexpr int kLinearMipmaps = 9987;
@@ -69,8 +71,10 @@ void put_geometry(const Swatch& swatch, const std::string& bin, nlohmann::json& 
                                            {"SCALAR", 12, 6, kUnsignedShort}}};
   std::size_t at = 0;
   for (std::size_t i = 0; i < kParts.size(); ++i) {
-    gltf["bufferViews"].push_back(
-        {{"buffer", 0}, {"byteOffset", at}, {"byteLength", kParts[i].bytes}});
+    gltf["bufferViews"].push_back({{"buffer", 0},
+                                   {"byteOffset", at},
+                                   {"byteLength", kParts[i].bytes},
+                                   {"target", i + 1 == kParts.size() ? kElements : kVertices}});
     gltf["accessors"].push_back({{"bufferView", i},
                                  {"componentType", kParts[i].component},
                                  {"count", kParts[i].count},

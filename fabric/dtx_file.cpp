@@ -34,6 +34,28 @@ bool is_free_text(const std::string& key) {
   return key == "description" || key == "notes" || key == "private" || key == "imprint";
 }
 
+// A number as it stands, or a comma.
+struct Word {
+  std::string_view text;
+  std::uint32_t line;
+};
+
+std::vector<Word> words_of(const DtxSection& section) {
+  std::vector<Word> words;
+  for (const DtxLine& line : section.lines) {
+    std::string_view rest = line.text;
+    while (!rest.empty()) {
+      const std::size_t end = std::max<std::size_t>(
+          std::min(rest.find_first_of(", \t"), rest.size()), rest.front() == ',' ? 1 : 0);
+      if (end > 0) {
+        words.push_back({rest.substr(0, end), line.line});
+      }
+      rest.remove_prefix(std::max<std::size_t>(end, 1));  // a blank is no word
+    }
+  }
+  return words;
+}
+
 }  // namespace
 
 DtxFile::DtxFile(std::string_view text, std::string name) : name_(std::move(name)) {
@@ -106,37 +128,25 @@ const DtxSection& DtxFile::required(const std::string& name, const std::string& 
 std::vector<DtxItem> DtxFile::items(const DtxSection& section, std::uint32_t limit) const {
   std::vector<DtxItem> items;
   bool goes_on = false;  // a comma was the last thing
-  for (const DtxLine& line : section.lines) {
-    std::string_view rest = line.text;
-    while (!rest.empty()) {
-      if (rest.front() == ',') {
-        if (items.empty() || goes_on) {
-          fail(section, line.line, "has a comma without a number before it");
-        }
-        goes_on = true;
-        rest.remove_prefix(1);
-        continue;
+  for (const Word& word : words_of(section)) {
+    if (word.text == ",") {
+      if (items.empty() || goes_on) {
+        fail(section, word.line, "has a comma without a number before it");
       }
-      if (is_blank(rest.front())) {
-        rest.remove_prefix(1);
-        continue;
-      }
-      const std::size_t end = std::min(rest.find_first_of(", \t"), rest.size());
-      const std::string_view word = rest.substr(0, end);
-      const auto number = parsed<std::uint32_t>(word);
-      if (!number || *number > limit) {
-        fail(section, line.line,
-             "has " + shown(word) + "; a whole number from 0 to " + std::to_string(limit) +
-                 " is needed");
-      }
-      if (!goes_on) {
-        items.push_back({{}, line.line});
-      }
-      goes_on = false;
-      items.back().numbers.push_back(*number);
-      // A comma right behind belongs to it; behind a blank it would, too.
-      rest.remove_prefix(end);
+      goes_on = true;
+      continue;
     }
+    const auto number = parsed<std::uint32_t>(word.text);
+    if (!number || *number > limit) {
+      fail(section, word.line,
+           "has " + shown(word.text) + "; a whole number from 0 to " + std::to_string(limit) +
+               " is needed");
+    }
+    if (!goes_on) {
+      items.push_back({{}, word.line});
+    }
+    goes_on = false;
+    items.back().numbers.push_back(*number);
   }
   if (goes_on) {
     fail(section, section.lines.back().line, "ends in a comma; a number is missing behind it");

@@ -92,18 +92,17 @@ NumberLists bit_rows(Bytes& bytes, const char* what, std::uint32_t rows, std::ui
   bytes.need(std::size_t{rows} * row_bytes, what);
   NumberLists lists(rows);
   for (std::vector<std::uint32_t>& list : lists) {
-    for (std::uint32_t byte = 0; byte < row_bytes; ++byte) {
-      const std::uint32_t bits = bytes.one(what);
-      for (std::uint32_t bit = 0; bit < 8; ++bit) {
-        const std::uint32_t number = 8 * byte + bit + 1;
-        if ((bits >> bit & 1U) != 0) {
-          if (number > width) {
-            bytes.fail(std::string(what) + " names number " + std::to_string(number) +
-                       ", there are " + std::to_string(width));
-          }
-          list.push_back(number);
-        }
+    std::uint32_t bits = 0;
+    for (std::uint32_t place = 0; place < 8 * row_bytes; ++place) {
+      bits = place % 8 == 0 ? bytes.one(what) : bits >> 1U;
+      if ((bits & 1U) == 0) {
+        continue;
       }
+      if (place >= width) {
+        bytes.fail(std::string(what) + " names number " + std::to_string(place + 1) +
+                   ", there are " + std::to_string(width));
+      }
+      list.push_back(place + 1);
     }
   }
   return lists;

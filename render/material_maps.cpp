@@ -57,8 +57,7 @@ struct PixelSums {
 class MapBaker {
  public:
   MapBaker(const Fabric& fabric, const MapSettings& settings)
-      : fabric_(fabric),
-        settings_(settings),
+      : settings_(settings),
         eye_(fabric),
         side_(static_cast<std::uint32_t>(std::ceil(std::sqrt(settings.samples)))) {
     const std::size_t pixels = std::size_t{settings.width} * settings.height;
@@ -104,14 +103,15 @@ class MapBaker {
   }
 
  private:
-  PixelSums look_at(std::uint32_t row, std::uint32_t column) const {
+  [[nodiscard]] PixelSums look_at(std::uint32_t row, std::uint32_t column) const {
     const std::uint64_t seed = core::derive_seed(settings_.seed, kPurposeOfMaps);
     const std::uint32_t pixel = row * settings_.width + column;
     PixelSums sums;
     for (std::uint32_t s = 0; s < settings_.samples; ++s) {
       core::Random random(seed, pixel, s);
+      const std::uint32_t row_of_strata = s / side_;
       // Strata of a square grid; where samples are no square number, the last ones stay empty.
-      const glm::vec2 stratum(static_cast<float>(s % side_), static_cast<float>(s / side_));
+      const glm::vec2 stratum(static_cast<float>(s % side_), static_cast<float>(row_of_strata));
       const float jitter_x = random.uniform();
       const glm::vec2 within =
           (stratum + glm::vec2(jitter_x, random.uniform())) / static_cast<float>(side_);
@@ -200,7 +200,6 @@ class MapBaker {
     return views;
   }
 
-  const Fabric& fabric_;
   MapSettings settings_;
   MapEye eye_;
   std::uint32_t side_;
