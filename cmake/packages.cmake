@@ -2,8 +2,9 @@
 #
 #   cmake --build build && (cd build && cpack)
 #
-# weft: the command, weft-open beside it, completion, manual pages, the user and the configuration
-# that the services share. weft-coordinator, weft-worker, weft-render: a service and its unit each.
+# weft: the command, weft-open beside it, the Python module, completion, manual pages, the user and
+# the configuration that the services share. weft-coordinator, weft-worker, weft-render: a service
+# and its unit each.
 include(GNUInstallDirs)
 
 # The programs write their own manual pages and completion; nothing of it is kept twice.
@@ -52,6 +53,9 @@ install(FILES ${CMAKE_SOURCE_DIR}/deploy/debian/weft-render.sysusers RENAME weft
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/examples/
   DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/weft/examples COMPONENT weft
   FILES_MATCHING PATTERN "*.textproto")
+# Where Debian's python3 looks; the module's own dependencies are suggested alone.
+install(DIRECTORY ${CMAKE_BINARY_DIR}/python/weft DESTINATION /usr/lib/python3/dist-packages
+  COMPONENT weft FILES_MATCHING PATTERN "*.py" PATTERN "weft.protoset" PATTERN "__pycache__" EXCLUDE)
 foreach(program coordinator worker render)
   install(TARGETS weft-${program} RUNTIME COMPONENT weft-${program})
   install(FILES ${pages}/man8/weft-${program}.8.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man8
@@ -110,7 +114,8 @@ set(CPACK_DEBIAN_COMPRESSION_TYPE xz CACHE STRING "xz, or gzip where time matter
 set(CPACK_DEBIAN_WEFT_PACKAGE_NAME weft)
 set(CPACK_DEBIAN_WEFT_PACKAGE_DEPENDS "systemd | systemd-standalone-sysusers")
 set(CPACK_DEBIAN_WEFT_PACKAGE_RECOMMENDS "mesa-vulkan-drivers | vulkan-icd")
-set(CPACK_DEBIAN_WEFT_PACKAGE_SUGGESTS "bash-completion, weft-coordinator, weft-worker, weft-render")
+set(CPACK_DEBIAN_WEFT_PACKAGE_SUGGESTS "bash-completion, python3-grpcio, python3-h5py, \
+python3-numpy, python3-protobuf, weft-coordinator, weft-worker, weft-render")
 set(CPACK_COMPONENT_WEFT_DESCRIPTION
   "fibre-level cloth: precomputation and pictures
  The command with which fabrics are described, precomputed, looked at and

@@ -89,6 +89,10 @@ test -s /usr/share/bash-completion/completions/weft
 test -s /usr/share/zsh/vendor-completions/_weft
 test -s /usr/share/fish/vendor_completions.d/weft.fish
 test -s /etc/weft/weft.toml
+test -s /usr/lib/python3/dist-packages/weft/weft.protoset
+if /usr/bin/python3 -c 'import grpc, h5py' 2>/dev/null; then
+  /usr/bin/python3 -c 'import weft; print(weft.expand("/usr/share/doc/weft/examples/tiny.textproto").name)' | grep -qx tiny
+fi
 for program in weft weft-open weft-coordinator weft-worker weft-render; do
   test "$(command -v $program)" = /usr/bin/$program
 done
