@@ -9,7 +9,7 @@
 #include "cli/textile_facts.h"
 #include "render/image.h"
 #include "render/obj_mesh.h"
-#include "tests/cli_programs.h"
+#include "tests/cli_one_material.h"
 
 // Files that weft writes, opened by software that is not ours.
 
@@ -43,12 +43,7 @@ class WrittenFiles : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TestFolder>();
-    std::string text = core::read_file(write_description(*folder_, "512"));
-    const std::size_t indigo = text.find("materials {");
-    text.erase(indigo, text.find("materials {", indigo + 1) - indigo);
-    text.replace(text.find("indigo"), 6, "straw");
-    core::write_file_atomically(at("tiny.textproto"), text);
-    run({"run", at("tiny.textproto"), "-o", at("tiny.h5"), "--quality", "preview"});
+    run({"run", write_one_material(*folder_, "512"), "-o", at("tiny.h5"), "--quality", "preview"});
     setenv("SOURCE_DATE_EPOCH", "1700000000", 1);  // NOLINT(concurrency-mt-unsafe)
     run({"maps", at("tiny.h5"), "-o", at("maps"), "--size", "24", "--samples", "9"});
   }
@@ -59,7 +54,7 @@ class WrittenFiles : public ::testing::Test {
   // Writes the fibres, and returns how many there are.
   static json exported(const std::string& name) {
     return json::parse(
-        run({"export", at("tiny.textproto"), "-o", at(name), "--quality", "preview", "--json"}));
+        run({"export", at("fabric.textproto"), "-o", at(name), "--quality", "preview", "--json"}));
   }
   static std::string run(const std::vector<std::string>& arguments) {
     const Finished finished = run_weft(*folder_, arguments);
@@ -179,7 +174,7 @@ TEST_F(WrittenFiles, MapsAreTheSameTwiceAndWrongUseIsSaid) {
   EXPECT_THAT(file.err, HasSubstr("is no folder and cannot be made one; choose another -o"));
   EXPECT_EQ(run_weft(folder(), {"maps", at("absent.h5"), "-o", at("m")}).code, 3);
   EXPECT_EQ(run_weft(folder(), {"maps", at("tiny.h5"), "-o", at("m"), "--size", "3"}).code, 2);
-  const Finished fibres = run_weft(folder(), {"maps", at("tiny.textproto"), "-o", at("m")});
+  const Finished fibres = run_weft(folder(), {"maps", at("fabric.textproto"), "-o", at("m")});
   EXPECT_EQ(fibres.code, 1);
   EXPECT_THAT(fibres.err, HasSubstr("make a database of it with weft run"));
 }

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "render/image.h"
-#include "tests/cli_programs.h"
+#include "tests/cli_one_material.h"
 
 namespace weft::cli {
 namespace {
@@ -45,7 +45,7 @@ TEST(Python, TheModuleGoesTheWholeWayAndSaysWhatTheCommandLineSays) {
                     folder / "node.log", true);
   const std::string ready = node.read_line(20).value_or("");
   const std::string address = ready.substr(ready.rfind(' ') + 1);
-  const std::string description = write_description(folder, "64");
+  const std::string description = write_one_material(folder, "64");
   const auto found = nlohmann::json::parse(
       python(folder, {WEFT_SOURCE_DIR "/tests/cli_python.py", cluster.address(), address,
                       description, folder.path().string()}));
@@ -103,7 +103,7 @@ TEST(Python, TheExampleDrawsItsPlots) {
     GTEST_SKIP() << "/usr/bin/python3 has no matplotlib, grpc, protobuf or h5py";
   }
   const TestFolder folder;
-  const std::string description = write_description(folder, "64");
+  const std::string description = write_one_material(folder, "64");
   const Finished ran =
       run_weft(folder, {"run", description, "-o", folder / "tiny.h5", "--quality", "preview"});
   ASSERT_EQ(ran.code, 0) << ran.err;
