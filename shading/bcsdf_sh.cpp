@@ -80,7 +80,8 @@ std::vector<double> azimuth_weights(double kappa) {
   return weights;
 }
 
-LobeSh lobe_sh(double theta_o, double beta, double kappa) {
+LobeSh lobe_sh(double theta_o, const LobeNormalisation& norm, double kappa) {
+  const double beta = norm.beta();
   static const QuadratureRule rule = gauss_legendre(48);
   const std::vector<double> azimuth = azimuth_weights(kappa);
   const double low = std::max(-kHalfPiExact, -theta_o - 9 * beta);
@@ -90,8 +91,8 @@ LobeSh lobe_sh(double theta_o, double beta, double kappa) {
     const double theta = 0.5 * (low + high) + 0.5 * (high - low) * rule.nodes[n];
     const double c = std::cos(theta);
     const double d = (theta + theta_o) / beta;
-    const double m = std::exp(-0.5 * d * d) / (std::sqrt(2 * std::numbers::pi) * beta) /
-                     lobe_normalisation(theta, beta);
+    const double m =
+        std::exp(-0.5 * d * d) / (std::sqrt(2 * std::numbers::pi) * beta) / norm(theta);
     const double weight = rule.weights[n] * 0.5 * (high - low) * m * c * c;
     const double schlick = weight * std::pow(1 - c, 5);
     for (std::size_t k = 0; k < azimuth.size(); ++k) {
@@ -114,12 +115,20 @@ bool odd_in_x(std::size_t j) {
   return m > 0 ? m % 2 == 1 : m < 0 && m % 2 == 0;
 }
 
-}  // namespace
+// What bcsdf_sh() needs of a material for any angle.
+struct Lobes {
+  explicit Lobes(const FibreMaterial& material)
+      : r(material.beta_r),
+        tt(material.beta_tt),
+        kappa_tt(1 / (static_cast<double>(material.gamma_tt) * material.gamma_tt)) {}
+  LobeNormalisation r;
+  LobeNormalisation tt;
+  double kappa_tt;
+};
 
-BcsdfSh bcsdf_sh(const FibreMaterial& material, double theta_o) {
-  const double gamma = material.gamma_tt;
-  const LobeSh r = lobe_sh(theta_o, material.beta_r, 0);
-  const LobeSh tt = lobe_sh(theta_o, material.beta_tt, 1 / (gamma * gamma));
+BcsdfSh bcsdf_sh(const FibreMaterial& material, const Lobes& lobes, double theta_o) {
+  const LobeSh r = lobe_sh(theta_o, lobes.r, 0);
+  const LobeSh tt = lobe_sh(theta_o, lobes.tt, lobes.kappa_tt);
   BcsdfSh out;
   for (int channel = 0; channel < 3; ++channel) {
     const double c_r = material.c_r[channel];
@@ -134,16 +143,23 @@ BcsdfSh bcsdf_sh(const FibreMaterial& material, double theta_o) {
   return out;
 }
 
+}  // namespace
+
+BcsdfSh bcsdf_sh(const FibreMaterial& material, double theta_o) {
+  return bcsdf_sh(material, Lobes(material), theta_o);
+}
+
 std::vector<float> bcsdf_sh_table(const FibreMaterial& material, int order) {
   const std::size_t side = static_cast<std::size_t>(order) + 1;
   const std::size_t count = side * side;
+  const Lobes lobes(material);
   std::vector<float> table(std::size_t{3} * kBcsdfShAngles * count);
   // Only half of the angles: mirroring the fibre in x turns theta_o into -theta_o.
   for (std::size_t i = 0; i < kBcsdfShAngles / 2; ++i) {
     const double theta_o =
         -kHalfPiExact + std::numbers::pi * static_cast<double>(i) / (kBcsdfShAngles - 1);
     const std::size_t mirrored = kBcsdfShAngles - 1 - i;
-    const BcsdfSh c = bcsdf_sh(material, theta_o);
+    const BcsdfSh c = bcsdf_sh(material, lobes, theta_o);
     for (std::size_t channel = 0; channel < 3; ++channel) {
       for (std::size_t j = 0; j < count; ++j) {
         const auto value = static_cast<float>(c[channel][j]);

@@ -139,12 +139,14 @@ FibreBcsdf::Tables::Tables(const FibreMaterial& m)
   const double beta_tt = m.beta_tt;
   peak_r = static_cast<float>(1 / (root_two_pi * beta_r));
   peak_tt = static_cast<float>(1 / (root_two_pi * beta_tt));
+  const LobeNormalisation norm_r(beta_r);
+  const LobeNormalisation norm_tt(beta_tt);
   norm.resize(kLobeTableCells + 1);
   for (std::size_t i = 0; i < norm.size(); ++i) {
     const double t = static_cast<double>(i) / kLobeTableCells;
     const double theta = half_pi * (1 - t * t);
-    norm[i] = {static_cast<float>(root_two_pi * beta_r * lobe_normalisation(theta, beta_r)),
-               static_cast<float>(root_two_pi * beta_tt * lobe_normalisation(theta, beta_tt))};
+    norm[i] = {static_cast<float>(root_two_pi * beta_r * norm_r(theta)),
+               static_cast<float>(root_two_pi * beta_tt * norm_tt(theta))};
   }
   const glm::dvec3 c_r = m.c_r;
   const glm::dvec3 c_tt = m.c_tt;
@@ -153,8 +155,8 @@ FibreBcsdf::Tables::Tables(const FibreMaterial& m)
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double t = static_cast<double>(i) / kRowCells;
     const double theta = half_pi * (1 - t * t);
-    const AdjointMoments r = adjoint_moments(theta, beta_r);
-    const AdjointMoments tt = adjoint_moments(theta, beta_tt);
+    const AdjointMoments r = adjoint_moments(theta, norm_r);
+    const AdjointMoments tt = adjoint_moments(theta, norm_tt);
     Row& row_i = rows[i];
     row_i.share_r = reflection_share(c_r * r.plain + (1.0 - c_r) * r.schlick,
                                      c_tt * (1.0 - c_r) * (tt.plain - tt.schlick));

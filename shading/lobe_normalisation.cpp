@@ -21,13 +21,19 @@ const QuadratureRule& rule_48() {
   return rule;
 }
 
+// Eight widths away from the axis nothing of the Gaussian is cut off,
+double first_cut_off(double beta) { return std::max(0.0, kHalfPiExact - 8 * beta); }
+
+// and over the whole line the integral is this.
+double whole(double mu, double beta) {
+  return 0.5 * (1 + std::exp(-2 * beta * beta) * std::cos(2 * mu));
+}
+
 }  // namespace
 
 double lobe_normalisation(double mu, double beta) {
-  // Eight widths away from the axis nothing of the Gaussian is cut off, and over the whole line
-  // the integral is (1 + exp(-2 beta^2) cos 2 mu) / 2.
-  if (std::abs(mu) < kHalfPiExact - 8 * beta) {
-    return 0.5 * (1 + std::exp(-2 * beta * beta) * std::cos(2 * mu));
+  if (std::abs(mu) < first_cut_off(beta)) {
+    return whole(mu, beta);
   }
   const double low = std::max(-kHalfPiExact, mu - 12 * beta);
   const double high = std::min(kHalfPiExact, mu + 12 * beta);
@@ -37,7 +43,48 @@ double lobe_normalisation(double mu, double beta) {
   });
 }
 
-AdjointMoments adjoint_moments(double theta_o, double beta) {
+LobeNormalisation::LobeNormalisation(double beta)
+    : beta_(beta),
+      cut_off_(first_cut_off(beta)),
+      piece_width_((kHalfPiExact - cut_off_) / kPieces) {
+  // By its values at the Chebyshev nodes of each piece.
+  constexpr auto kCount = static_cast<double>(kTerms);
+  const auto node = [](std::size_t k) {
+    return std::cos(std::numbers::pi * (static_cast<double>(k) + 0.5) / kCount);
+  };
+  for (std::size_t p = 0; p < kPieces; ++p) {
+    const double middle = cut_off_ + (static_cast<double>(p) + 0.5) * piece_width_;
+    for (std::size_t k = 0; k < kTerms; ++k) {
+      const double value = lobe_normalisation(middle + 0.5 * piece_width_ * node(k), beta);
+      for (std::size_t j = 0; j < kTerms; ++j) {
+        const double angle =
+            std::numbers::pi * static_cast<double>(j) * (static_cast<double>(k) + 0.5) / kCount;
+        pieces_[p][j] += (j == 0 ? 1 : 2) / kCount * value * std::cos(angle);
+      }
+    }
+  }
+}
+
+double LobeNormalisation::operator()(double mu) const {
+  if (std::abs(mu) < cut_off_) {
+    return whole(mu, beta_);
+  }
+  const double at = (std::abs(mu) - cut_off_) / piece_width_;
+  const auto piece = std::min(static_cast<std::size_t>(at), kPieces - 1);
+  const double x = 2 * (at - static_cast<double>(piece)) - 1;
+  // Clenshaw's recurrence.
+  double last = 0;
+  double before = 0;
+  for (std::size_t j = kTerms - 1; j > 0; --j) {
+    const double next = 2 * x * last - before + pieces_[piece][j];
+    before = last;
+    last = next;
+  }
+  return x * last - before + pieces_[piece][0];
+}
+
+AdjointMoments adjoint_moments(double theta_o, const LobeNormalisation& norm) {
+  const double beta = norm.beta();
   const double low = std::max(-kHalfPiExact, -theta_o - 9 * beta);
   const double high = std::min(kHalfPiExact, -theta_o + 9 * beta);
   const QuadratureRule& rule = rule_48();
@@ -45,8 +92,7 @@ AdjointMoments adjoint_moments(double theta_o, double beta) {
   for (std::size_t k = 0; k < rule.nodes.size(); ++k) {
     const double t = 0.5 * (low + high) + 0.5 * (high - low) * rule.nodes[k];
     const double c = std::cos(t);
-    const double m =
-        rule.weights[k] * c * c * gaussian(t + theta_o, beta) / lobe_normalisation(t, beta);
+    const double m = rule.weights[k] * c * c * gaussian(t + theta_o, beta) / norm(t);
     sum.plain += m;
     sum.schlick += m * std::pow(1 - c, 5);
   }

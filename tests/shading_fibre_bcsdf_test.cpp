@@ -81,14 +81,26 @@ TEST(FibreBcsdf, ConservesThePowerOfEveryIncidentRay) {
 TEST(FibreBcsdf, TabulatesTheAdjointAlbedo) {
   for (const auto& v : vectors::kAdjointAlbedo) {
     const vectors::Fibre& f = vectors::kFibres[v.fibre];
-    const AdjointMoments r = adjoint_moments(v.theta_o, f.beta_r);
-    const AdjointMoments tt = adjoint_moments(v.theta_o, f.beta_tt);
+    const AdjointMoments r = adjoint_moments(v.theta_o, LobeNormalisation(f.beta_r));
+    const AdjointMoments tt = adjoint_moments(v.theta_o, LobeNormalisation(f.beta_tt));
     EXPECT_NEAR(f.c_r * r.plain + (1 - f.c_r) * r.schlick, v.r, 1e-9) << f.name;
     EXPECT_NEAR(f.c_tt * (1 - f.c_r) * (tt.plain - tt.schlick), v.tt, 1e-9) << f.name;
     const FibreBcsdf& bcsdf = published(v.fibre);
     for (const double side : {-1.0, 1.0}) {
       EXPECT_NEAR(bcsdf.adjoint_albedo(static_cast<float>(side * v.theta_o)).x, v.r + v.tt, 5e-5)
           << f.name << " theta_o " << v.theta_o;
+    }
+  }
+}
+
+TEST(FibreBcsdf, InterpolatesItsNormalisation) {
+  for (const double beta : {0.01, 0.05, 0.1, 0.3, 0.6, 1.5}) {
+    const LobeNormalisation norm(beta);
+    EXPECT_EQ(norm.beta(), beta);
+    for (int i = -1000; i <= 1000; ++i) {
+      const double mu = kPiExact / 2 * i / 1000;
+      const double exact = lobe_normalisation(mu, beta);
+      EXPECT_NEAR(norm(mu), exact, 1e-12 * exact) << beta << " " << mu;
     }
   }
 }

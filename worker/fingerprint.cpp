@@ -138,7 +138,7 @@ void probe_algebra(core::Hasher& hasher) {
 core::Digest numerics_fingerprint() {
   const transport::FlushDenormals flush;  // as bakers do
   core::Hasher hasher;
-  hasher.field("weft numerics 3");
+  hasher.field("weft numerics 4");
   probe_libm<float>(hasher);
   probe_libm<double>(hasher);
   probe_geometry(hasher);
