@@ -120,10 +120,11 @@ BENCHMARK(signed_distance)->ArgName("limit_mrad")->Arg(0)->Arg(400)->Unit(benchm
 
 void gaussian_weights(benchmark::State& state) {
   const auto some = images(64);
-  const auto axes = transport::sg_axes(48, 1234);
+  const transport::SgRegions regions(48, kResolution);
+  const std::uint16_t rotation = transport::sg_rotation(1, 2, kResolution);
   std::size_t i = 0;
   for (auto unused : state) {
-    benchmark::DoNotOptimize(transport::sg_weights(some[i++ % some.size()], kResolution, axes));
+    benchmark::DoNotOptimize(regions.weights(some[i++ % some.size()], rotation));
   }
 }
 BENCHMARK(gaussian_weights)->Unit(benchmark::kMicrosecond);

@@ -90,10 +90,10 @@ class Seen {
     bits_ = transport::visibility_bits(fabric.scene(), segment, kResolution);
     distances_ = transport::signed_distance(bits_, kResolution);
     transport::correct_pixel_bias(distances_, kResolution);
-    const std::uint16_t rotation = transport::sg_rotation(7, segment);
+    const std::uint16_t rotation = transport::sg_rotation(7, segment, kResolution);
     for (const Gaussians& sum : kSums) {
       axes_.push_back(transport::sg_axes(sum.count, rotation));
-      weights_.push_back(transport::sg_weights(bits_, kResolution, axes_.back()));
+      weights_.push_back(transport::SgRegions(sum.count, kResolution).weights(bits_, rotation));
     }
   }
 

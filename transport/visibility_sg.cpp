@@ -1,19 +1,47 @@
 #include "transport/visibility_sg.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <numbers>
+
+#include <glm/geometric.hpp>
 
 #include "core/check.h"
 #include "core/random.h"
 #include "shading/visibility.h"
 #include "transport/sphere.h"
-#include "transport/visibility.h"
 
 namespace weft::transport {
 
-std::uint16_t sg_rotation(std::uint64_t seed, std::uint32_t segment) {
-  return static_cast<std::uint16_t>(core::Random(seed, segment).bits() >> 16);
+namespace {
+
+constexpr std::uint32_t kFullTurn = 65536;
+constexpr std::size_t kWordBits = 64;
+
+glm::vec3 direction_of(std::uint32_t row, std::uint32_t column, std::uint32_t resolution) {
+  const double theta = row_theta(row, resolution);
+  const double phi = column_phi(column, resolution);
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
+
+// Pixels `first` ... `first` + 63 of a row that stands twice in `bytes`, with a word behind it.
+std::uint64_t word_at(std::span<const std::uint8_t> bytes, std::size_t first) {
+  std::uint64_t word = 0;
+  std::memcpy(&word, &bytes[first / 8], sizeof word);
+  const std::size_t shift = first % 8;
+  if (shift == 0) {
+    return word;
+  }
+  return word >> shift | std::uint64_t{bytes[first / 8 + sizeof word]} << (kWordBits - shift);
+}
+
+}  // namespace
+
+std::uint16_t sg_rotation(std::uint64_t seed, std::uint32_t segment, std::uint32_t resolution) {
+  const std::uint32_t column = core::Random(seed, segment).below(resolution);
+  return static_cast<std::uint16_t>((column * kFullTurn + resolution / 2) / resolution);
 }
 
 std::vector<glm::vec3> sg_axes(std::uint32_t count, std::uint16_t rotation) {
@@ -26,40 +54,59 @@ std::vector<glm::vec3> sg_axes(std::uint32_t count, std::uint16_t rotation) {
   return axes;
 }
 
-std::vector<float> sg_weights(std::span<const std::uint8_t> bits, std::uint32_t resolution,
-                              std::span<const glm::vec3> axes) {
-  CHECK_EQ(bits.size(), std::size_t{resolution} * resolution / 8);
-  CHECK_GT(axes.size(), 0U);
-  std::vector<float> cosine(resolution);
-  std::vector<float> sine(resolution);
-  for (std::uint32_t column = 0; column < resolution; ++column) {
-    cosine[column] = static_cast<float>(std::cos(column_phi(column, resolution)));
-    sine[column] = static_cast<float>(std::sin(column_phi(column, resolution)));
-  }
-  std::vector<double> weights(axes.size());
-  std::vector<float> best(resolution);
-  std::vector<std::uint32_t> nearest(resolution);
+SgRegions::SgRegions(std::uint32_t count, std::uint32_t resolution)
+    : count_(count),
+      resolution_(resolution),
+      row_words_((resolution + kWordBits - 1) / kWordBits),
+      first_region_{0} {
+  CHECK_GT(count, 0U);
+  CHECK(resolution > 0 && resolution % 8 == 0);
+  const std::vector<glm::vec3> axes = sg_axes(count, 0);
+  std::vector<std::uint64_t> of_axis(count * row_words_);
   for (std::uint32_t row = 0; row < resolution / 2; ++row) {
-    // All columns of a row at once: the loops over columns run in vector registers.
-    std::fill(best.begin(), best.end(), -2.0f);
-    const double theta = row_theta(row, resolution);
-    const auto sin_theta = static_cast<float>(std::sin(theta));
-    const auto cos_theta = static_cast<float>(std::cos(theta));
-    for (std::uint32_t q = 0; q < axes.size(); ++q) {
-      const float x = axes[q].x * sin_theta;
-      const float y = axes[q].y * sin_theta;
-      const float z = axes[q].z * cos_theta;
-      for (std::uint32_t column = 0; column < resolution; ++column) {
-        const float dot = x * cosine[column] + y * sine[column] + z;
-        nearest[column] = dot > best[column] ? q : nearest[column];
-        best[column] = std::max(best[column], dot);
+    solid_angles_.push_back(pixel_solid_angle(row, resolution));
+    std::fill(of_axis.begin(), of_axis.end(), 0);
+    for (std::uint32_t column = 0; column < resolution; ++column) {
+      const glm::vec3 direction = direction_of(row, column, resolution);
+      std::size_t nearest = 0;
+      for (std::size_t q = 1; q < axes.size(); ++q) {
+        nearest = glm::dot(axes[q], direction) > glm::dot(axes[nearest], direction) ? q : nearest;
+      }
+      of_axis[nearest * row_words_ + column / kWordBits] |= std::uint64_t{1} << column % kWordBits;
+    }
+    for (std::uint32_t q = 0; q < count; ++q) {
+      const auto words = std::span(of_axis).subspan(q * row_words_, row_words_);
+      if (std::any_of(words.begin(), words.end(), [](std::uint64_t word) { return word != 0; })) {
+        regions_.push_back({q, words_.size()});
+        words_.insert(words_.end(), words.begin(), words.end());
       }
     }
-    const double solid_angle = pixel_solid_angle(row, resolution);
-    for (std::uint32_t column = 0; column < resolution; ++column) {
-      if (is_visible(bits, std::size_t{row} * resolution + column)) {
-        weights[nearest[column]] += solid_angle;
+    first_region_.push_back(regions_.size());
+  }
+}
+
+std::vector<float> SgRegions::weights(std::span<const std::uint8_t> bits,
+                                      std::uint16_t rotation) const {
+  const std::size_t row_bytes = resolution_ / 8;
+  CHECK_EQ(bits.size(), row_bytes * resolution_);
+  const std::uint32_t columns = (rotation * resolution_ + kFullTurn / 2) / kFullTurn;
+  std::vector<double> weights(count_);
+  std::vector<std::uint8_t> twice(2 * row_bytes + 2 * sizeof(std::uint64_t));
+  std::vector<std::uint64_t> turned(row_words_);
+  for (std::size_t row = 0; row < solid_angles_.size(); ++row) {
+    // The image is turned back instead of the axes.
+    const auto bytes = bits.subspan(row * row_bytes, row_bytes);
+    std::copy(bytes.begin(), bytes.end(), twice.begin());
+    std::copy(bytes.begin(), bytes.end(), twice.begin() + static_cast<std::ptrdiff_t>(row_bytes));
+    for (std::size_t w = 0; w < row_words_; ++w) {
+      turned[w] = word_at(twice, columns + w * kWordBits);
+    }
+    for (std::size_t r = first_region_[row]; r < first_region_[row + 1]; ++r) {
+      int visible = 0;
+      for (std::size_t w = 0; w < row_words_; ++w) {
+        visible += std::popcount(words_[regions_[r].first_word + w] & turned[w]);
       }
+      weights[regions_[r].axis] += visible * solid_angles_[row];
     }
   }
   return {weights.begin(), weights.end()};
@@ -69,9 +116,9 @@ double open_share(std::span<const std::uint8_t> bits, std::uint32_t resolution) 
   CHECK_EQ(bits.size(), std::size_t{resolution} * resolution / 8);
   double sum = 0;
   for (std::uint32_t row = 0; row < resolution; ++row) {
-    std::uint32_t visible = 0;
-    for (std::uint32_t column = 0; column < resolution; ++column) {
-      visible += is_visible(bits, std::size_t{row} * resolution + column) ? 1 : 0;
+    int visible = 0;
+    for (const std::uint8_t byte : bits.subspan(row * (resolution / 8), resolution / 8)) {
+      visible += std::popcount(byte);
     }
     sum += visible * pixel_solid_angle(row, resolution);
   }

@@ -52,6 +52,7 @@ class CoefficientsBaker : public Baker {
                         "the same setting");
     }
     fit_.emplace(basis_, spec_.resolution());
+    regions_.emplace(spec_.sg_count(), spec_.resolution());
   }
 
   std::string bake(std::uint64_t shard, const std::string& shard_input,
@@ -116,10 +117,9 @@ class CoefficientsBaker : public Baker {
   }
 
   void add_ssg(std::span<const std::uint8_t> image, std::uint32_t segment, Result& result) const {
-    const std::uint16_t rotation = transport::sg_rotation(spec_.rotation_seed(), segment);
-    const std::vector<float> weights = transport::sg_weights(
-        image, spec_.resolution(), transport::sg_axes(spec_.sg_count(), rotation));
-    for (const float w : weights) {
+    const std::uint16_t rotation =
+        transport::sg_rotation(spec_.rotation_seed(), segment, spec_.resolution());
+    for (const float w : regions_->weights(image, rotation)) {
       result.ssg.push_back(half(w));
     }
     result.rotation.push_back(rotation);
@@ -130,6 +130,7 @@ class CoefficientsBaker : public Baker {
   std::uint64_t shard_count_;
   transport::DistanceBasis basis_;
   std::optional<transport::DistanceFit> fit_;
+  std::optional<transport::SgRegions> regions_;
 };
 
 }  // namespace
