@@ -50,6 +50,7 @@ class OneUpload final : public v1::BlobService::Service {
 
   std::size_t breaks_off_behind = 0;  // bytes of the first upload
   bool damages_what_came = false;
+  grpc::StatusCode breaks_off_with = grpc::StatusCode::UNAVAILABLE;
 
   grpc::Status QueryWrite(grpc::ServerContext* /*context*/,
                           const v1::QueryWriteRequest* /*request*/,
@@ -74,7 +75,7 @@ class OneUpload final : public v1::BlobService::Service {
       kept_ += request.data();
       if (offsets_.size() == 1 && breaks_off_behind > 0 && kept_.size() >= breaks_off_behind) {
         kept_[1000] = static_cast<char>(kept_[1000] ^ (damages_what_came ? 1 : 0));
-        return {grpc::StatusCode::UNAVAILABLE, "the power went"};
+        return {breaks_off_with, "the power went"};
       }
     }
     if (core::digest_of(kept_) != digest) {
@@ -110,6 +111,29 @@ TEST(BlobClient, BrokenUploadGoesOnWhereItWas) {
   BlobClient(coordinator.channel()).write(core::digest_of(kData), kData, goes_on);
   EXPECT_EQ(coordinator.stored(), kData);
   EXPECT_EQ(coordinator.offsets(), (std::vector<std::uint64_t>{0, 2 * kMiB}));
+}
+
+// A coordinator that stops cancels what it is answering: the upload goes on when it is back.
+TEST(BlobClient, CancelledUploadGoesOnWhereItWas) {
+  OneUpload coordinator;
+  coordinator.breaks_off_behind = 2 * kMiB;
+  coordinator.breaks_off_with = grpc::StatusCode::CANCELLED;
+  BlobClient(coordinator.channel()).write(core::digest_of(kData), kData, goes_on);
+  EXPECT_EQ(coordinator.stored(), kData);
+  EXPECT_EQ(coordinator.offsets(), (std::vector<std::uint64_t>{0, 2 * kMiB}));
+}
+
+TEST(BlobClient, ClosedClientUploadsNothing) {
+  OneUpload coordinator;
+  BlobClient client(coordinator.channel());
+  client.close();
+  try {
+    client.write(core::digest_of(kData), kData, goes_on);
+    FAIL() << "no error";
+  } catch (const core::Error& error) {
+    EXPECT_EQ(error.code(), core::Code::kCancelled);
+  }
+  EXPECT_EQ(coordinator.stored(), "");
 }
 
 TEST(BlobClient, UploadBeginsAgainWhenWhatWasKeptIsDamaged) {

@@ -222,7 +222,7 @@ SphereGrid::SphereGrid(std::uint32_t resolution_in) : resolution(resolution_in) 
     sin_phi.push_back(static_cast<float>(std::sin(column_phi(i, resolution))));
     cos_phi.push_back(static_cast<float>(std::cos(column_phi(i, resolution))));
   }
-  sin_theta.resize((sin_theta.size() + 15) / 16 * 16);
+  sin_theta.resize((sin_theta.size() + 63) / 64 * 64);
   cos_theta.resize(sin_theta.size());
 }
 
@@ -246,8 +246,9 @@ void paint(const SeenCapsule& capsule, const ImageRegion& region, const SphereGr
     }
     Strip strip{0, static_cast<std::size_t>(first), static_cast<std::size_t>(last)};
     set_columns(shadow, grid, strip.first_column, strip.last_column, columns);
-    strip.first_row = static_cast<std::size_t>(region.first_row) / step * step;
-    for (; strip.first_row <= static_cast<std::size_t>(region.last_row); strip.first_row += step) {
+    auto row = static_cast<std::size_t>(region.first_row);
+    for (; row <= static_cast<std::size_t>(region.last_row); row = strip.first_row + step) {
+      strip.first_row = std::min(row, row / 64 * 64 + 64 - step);  // within a word of the mask
       if (wide) {
         paint_rows_wide(shadow, columns, strip, grid, mask);
       } else {

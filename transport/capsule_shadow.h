@@ -12,7 +12,7 @@ namespace weft::transport {
 struct SphereGrid {
   explicit SphereGrid(std::uint32_t resolution);
   std::uint32_t resolution;
-  std::vector<float> sin_theta;  // [rows], zeros beyond up to a multiple of sixteen
+  std::vector<float> sin_theta;  // [rows], zeros beyond up to whole words of the mask
   std::vector<float> cos_theta;
   std::vector<float> sin_phi;  // [columns]
   std::vector<float> cos_phi;

@@ -35,8 +35,6 @@ class DistanceFit {
   struct Work;  // on one image
   void measure(std::span<const std::uint8_t> image, Work& work) const;
   void project(Work& work) const;
-  template <std::size_t kVectors>
-  void evaluate(Work& work, std::size_t first) const;
   std::size_t gather(Work& work) const;
   void step(std::size_t rows, Work& work) const;
 

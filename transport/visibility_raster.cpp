@@ -1,7 +1,6 @@
 #include "transport/visibility_raster.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -140,12 +139,19 @@ class Painter {
       }
       const SeenCapsule capsule{piece.start_mm + shift_mm_, piece.axis, piece.length_mm,
                                 piece.radius_mm};
-      if (holds_origin(capsule)) {
+      if (is_whole(region) && holds_origin(capsule)) {
         blind_ = true;
         return;
       }
       paint(capsule, region, grid_, wide_, mask_);
     }
+  }
+
+  // As that of every ball that holds the eye.
+  [[nodiscard]] bool is_whole(const ImageRegion& region) const {
+    const auto last = static_cast<std::int32_t>(grid_.resolution) - 1;
+    return region.first_row == 0 && region.last_row == last && region.first_column == 0 &&
+           region.last_column == last;
   }
 
   [[nodiscard]] bool is_own(const Piece& piece) const {
@@ -186,18 +192,7 @@ std::vector<std::uint8_t> VisibilityRaster::bits(std::uint32_t segment, std::uin
   CHECK_LE(resolution, kMaxMaskResolution);
   const SphereGrid grid(resolution);
   Painter painter(state_->scene, state_->tree, grid, segment);
-  const CoverMask mask = painter.paint_all(checkpoint);
-  std::vector<std::uint8_t> bits(std::size_t{resolution} * resolution / 8);
-  for (std::size_t w = 0; w < mask.words(); ++w) {
-    for (std::size_t c = 0; c < resolution; ++c) {
-      for (std::uint64_t open = mask.open_rows(w, c); open != 0; open &= open - 1) {
-        const std::size_t row = 64 * w + static_cast<std::size_t>(std::countr_zero(open));
-        std::uint8_t& byte = bits[(row * resolution + c) / 8];
-        byte = static_cast<std::uint8_t>(byte | 1U << (c % 8));
-      }
-    }
-  }
-  return bits;
+  return painter.paint_all(checkpoint).open_pixels();
 }
 
 }  // namespace weft::transport

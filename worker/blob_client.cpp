@@ -17,7 +17,9 @@ constexpr std::chrono::seconds kAllowance{30};
 constexpr std::uint64_t kSlowestBytesPerSecond = 1'000'000;
 
 bool is_away(const grpc::Status& status) {
+  // A coordinator that stops cancels the calls that it is answering.
   return status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+         status.error_code() == grpc::StatusCode::CANCELLED ||
          status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
 }
 
@@ -59,6 +61,11 @@ void BlobClient::close() {
   }
 }
 
+bool BlobClient::is_closed() {
+  const std::lock_guard lock(mutex_);
+  return is_closed_;
+}
+
 BlobClient::BlobClient(const std::shared_ptr<grpc::Channel>& channel)
     : stub_(v1::BlobService::NewStub(channel)) {}
 
@@ -83,7 +90,11 @@ std::string BlobClient::read(const core::Digest& digest, const std::function<boo
     if (status.ok()) {
       break;
     }
-    if (should_stop()) {
+    if (data.size() > v1::kBlobLimitBytes) {
+      throw core::Error(core::Code::kDataLoss,
+                        "blob " + digest.hex() + " is longer than any blob may be");
+    }
+    if (should_stop() || is_closed()) {
       throw core::Error(core::Code::kCancelled, "stopped while reading a blob");
     }
     if (!is_away(status)) {
@@ -143,7 +154,7 @@ void BlobClient::write(const core::Digest& digest, std::string_view data,
     if (status.ok()) {
       return;
     }
-    if (should_stop()) {
+    if (should_stop() || is_closed()) {
       throw core::Error(core::Code::kCancelled, "stopped while writing a blob");
     }
     // Somebody else uploads it, the coordinator has kept less of it than it said, or what it kept

@@ -40,6 +40,7 @@ class BlobClient {
  private:
   class Call;
 
+  [[nodiscard]] bool is_closed();
   [[nodiscard]] std::optional<std::uint64_t> committed(const core::Digest& digest);
   [[nodiscard]] grpc::Status send(const core::Digest& digest, std::string_view data,
                                   std::uint64_t offset);
