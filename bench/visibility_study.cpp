@@ -270,9 +270,9 @@ void print_fabric(const std::string& name, const std::vector<std::vector<Sent>>&
   print_row("SSDF, not projected", [](const Sent& one) { return one.by_distance[1]; });
   for (const Blend& blend : kBlends) {
     const Gaussians& sum = kSums[blend.sum];
-    const std::string name = fmt::format("blend of {}, {:g} in [{:g}, {:g}]", sum.count,
-                                         sum.sharpness, blend.low, blend.high);
-    print_row(name, [&blend](const Sent& one) {
+    const std::string of_blend = fmt::format("blend of {}, {:g} in [{:g}, {:g}]", sum.count,
+                                             sum.sharpness, blend.low, blend.high);
+    print_row(of_blend, [&blend](const Sent& one) {
       const auto share =
           static_cast<double>(shading::ssdf_share(one.sharpness, blend.low, blend.high));
       return (1 - share) * one.by_sum[blend.sum] + share * one.by_distance[0];
