@@ -44,7 +44,8 @@ class JobFollower {
       if (interruption_.requested()) {
         leave();
       }
-      if (status.error_code() == grpc::StatusCode::UNAVAILABLE) {
+      if (status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+          status.error_code() == grpc::StatusCode::CANCELLED) {  // it stops
         wait_for_coordinator(status);
       } else if (status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) {
         client_.check(status, "watch " + job_id_);
