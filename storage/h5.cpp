@@ -9,6 +9,7 @@
 
 #include "core/check.h"
 #include "core/error.h"
+#include "storage/h5_filters.h"
 #include "storage/h5_types.h"
 
 namespace weft::storage::h5 {
@@ -16,7 +17,7 @@ namespace weft::storage::h5 {
 namespace {
 
 constexpr std::uint64_t kChunkBytes = std::uint64_t{1} << 20;
-constexpr unsigned kDeflateLevel = 6;
+constexpr unsigned kDeflateLevel = 6;  // of texts; readers do not need it
 constexpr unsigned kChunkIndexRank = 4;
 
 Handle made(hid_t id, const std::string& path) {
@@ -34,12 +35,16 @@ void done(herr_t status, const std::string& path) {
   }
 }
 
-Handle dataset_properties(const Shape& shape, std::size_t element_bytes, bool compress) {
-  Handle properties(H5Pcreate(H5P_DATASET_CREATE));
+std::vector<hsize_t> chunk_of(const Shape& shape, std::size_t element_bytes) {
   std::vector<hsize_t> chunk(shape.begin(), shape.end());
   const std::uint64_t row_bytes =
       std::max<std::uint64_t>(1, *bytes_of(shape, element_bytes) / shape[0]);
   chunk[0] = std::clamp<std::uint64_t>(kChunkBytes / row_bytes, 1, shape[0]);
+  return chunk;
+}
+
+Handle dataset_properties(const std::vector<hsize_t>& chunk, bool compress) {
+  Handle properties(H5Pcreate(H5P_DATASET_CREATE));
   CHECK(H5Pset_chunk(properties.id(), static_cast<int>(chunk.size()), chunk.data()) >= 0);
   CHECK(H5Pset_obj_track_times(properties.id(), false) >= 0);
   CHECK(H5Pset_fill_time(properties.id(), H5D_FILL_TIME_NEVER) >= 0);
@@ -101,11 +106,21 @@ void ImageWriter::add_array(const std::string& path, Element element, const Shap
   CHECK(!data.empty());
   const std::vector<hsize_t> extents(shape.begin(), shape.end());
   const Handle space(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr));
-  const Handle properties = dataset_properties(shape, element_bytes, compress);
+  const std::vector<hsize_t> chunk = chunk_of(shape, element_bytes);
+  const Handle properties = dataset_properties(chunk, compress);
   const Handle dataset = made(H5Dcreate2(file_.id(), path.c_str(), type.id(), space.id(),
                                          H5P_DEFAULT, properties.id(), H5P_DEFAULT),
                               path);
-  done(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, data.data()), path);
+  // Filtered here and not by HDF5, which would do it in one thread.
+  const std::uint64_t chunk_bytes = *bytes_of(Shape(chunk.begin(), chunk.end()), element_bytes);
+  std::vector<hsize_t> at(shape.size(), 0);
+  for (const FilteredChunk& filtered :
+       filtered_chunks(data, chunk_bytes, element_bytes, compress)) {
+    done(H5Dwrite_chunk(dataset.id(), H5P_DEFAULT, filtered.skipped, at.data(),
+                        filtered.bytes.size(), filtered.bytes.data()),
+         path);
+    at[0] += chunk[0];
+  }
   add_caption(dataset.id(), path, caption);
 }
 
@@ -124,7 +139,7 @@ void ImageWriter::add_text(const std::string& path, const std::vector<std::strin
   const Handle type = type_of(Element::kText, length);
   const hsize_t extent = texts.size();
   const Handle space(H5Screate_simple(1, &extent, nullptr));
-  const Handle properties = dataset_properties({extent}, length, true);
+  const Handle properties = dataset_properties(chunk_of({extent}, length), true);
   const Handle dataset = made(H5Dcreate2(file_.id(), path.c_str(), type.id(), space.id(),
                                          H5P_DEFAULT, properties.id(), H5P_DEFAULT),
                               path);

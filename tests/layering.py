@@ -30,6 +30,7 @@ ORDER = {"coordinator": ["queue", "journal", "versions", "scheduler", "services"
 BEHIND = {
     r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_chunks.cpp", "storage/h5_reader.cpp",
                            "storage/h5_types.cpp"},
+    r"libdeflate\.h": {"storage/h5_filters.cpp"},
     r"embree3/.*": {"transport/embree_scene.cpp", "render/triangle_scene.cpp"},
     r"(OpenEXR/)?Imf.*": {"render/image.cpp", "render/files/exr_parser.cpp"},
     r"png\.h": {"render/png.cpp", "render/files/png_parser.cpp", "coordinator/web/png.cpp"},

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace weft::storage::h5 {
+
+// A chunk of a dataset as it stands in a file.
+struct FilteredChunk {
+  std::string bytes;
+  std::uint32_t skipped = 0;  // bit i: filter i of the dataset was left out
+};
+
+// What HDF5's own filters make of chunks of `chunk_bytes` of plain data (the last one is filled up
+// with zeros): shuffle and deflate where `compress`, then Fletcher's checksum. Deflate is left out
+// of chunks that it would not shorten. By all threads of the machine; the same bytes on any number
+// of them. REQUIRES: chunk_bytes and data.size() are multiples of element_bytes, and positive.
+[[nodiscard]] std::vector<FilteredChunk> filtered_chunks(std::span<const std::byte> data,
+                                                         std::size_t chunk_bytes,
+                                                         std::size_t element_bytes, bool compress);
+
+}  // namespace weft::storage::h5
