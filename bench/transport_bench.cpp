@@ -10,6 +10,7 @@
 
 #include "bench/machine_limits.h"
 #include "core/random.h"
+#include "core/resource_use.h"
 #include "fabric/build.h"
 #include "fabric/description.h"
 #include "shading/fibre_bcsdf.h"
@@ -58,13 +59,18 @@ const transport::Scene& scene() {
   return built;
 }
 
-// Sets a kernel's multiply-adds against those that the thread could do at best.
-void set_multiply_adds(benchmark::State& state, double each) {
-  state.counters["multiply_adds/s"] =
-      benchmark::Counter(each, benchmark::Counter::kIsIterationInvariantRate);
-  state.counters["share_of_limit"] =
-      benchmark::Counter(each / bench::machine_limits().multiply_adds_per_s,
-                         benchmark::Counter::kIsIterationInvariantRate);
+// Runs a kernel and sets its multiply-adds against those that the thread could do at best.
+template <class Kernel>
+void measure(benchmark::State& state, double multiply_adds, const Kernel& kernel) {
+  const double limit = bench::machine_limits().multiply_adds_per_s;
+  const double cpu_before = core::thread_cpu_seconds();
+  for (auto unused : state) {
+    kernel();
+  }
+  const double seconds = core::thread_cpu_seconds() - cpu_before;
+  const double rate = multiply_adds * static_cast<double>(state.iterations()) / seconds;
+  state.counters["multiply_adds_per_s"] = rate;
+  state.counters["share_of_limit"] = rate / limit;
 }
 
 std::uint32_t some_segment(std::uint64_t i) {
@@ -140,11 +146,10 @@ void pca(benchmark::State& state) {
       sample[n * kPixels + p] = (random.uniform() - 0.5f) / (1 + 0.01f * static_cast<float>(p));
     }
   }
-  for (auto unused : state) {
-    benchmark::DoNotOptimize(transport::principal_components(sample, kPixels, 48, 1));
-  }
   // 64 columns to and fro in three iterations, and once more at the end.
-  set_multiply_adds(state, 7.0 * 64 * kPixels * static_cast<double>(count));
+  measure(state, 7.0 * 64 * kPixels * static_cast<double>(count), [&] {
+    benchmark::DoNotOptimize(transport::principal_components(sample, kPixels, 48, 1));
+  });
 }
 BENCHMARK(pca)->Arg(1024)->Arg(4096)->Unit(benchmark::kSecond)->Iterations(1);
 
@@ -163,11 +168,10 @@ void normal_equations(benchmark::State& state) {
   std::vector<float> matrix(kWidth * kWidth);
   std::vector<float> vector(kWidth);
   const bool is_wide = transport::wide_is_available();
-  for (auto unused : state) {
+  measure(state, kRows * kWidth * ((kWidth + 1) / 2.0 + 1), [&] {
     transport::form_normal_equations(a, b, kRows, is_wide, matrix, vector);
     benchmark::DoNotOptimize(matrix.data());
-  }
-  set_multiply_adds(state, kRows * kWidth * ((kWidth + 1) / 2.0 + 1));
+  });
 }
 BENCHMARK(normal_equations)->Unit(benchmark::kMicrosecond);
 
@@ -183,15 +187,14 @@ void transfer_sums_of_256(benchmark::State& state) {
     directions.push_back(
         glm::normalize(glm::vec3(random.uniform(), random.uniform(), random.uniform()) - 0.5F));
   }
-  for (auto unused : state) {
+  measure(state, 2.0 * static_cast<double>(chunk.size()) * kPaths, [&] {
     for (std::size_t i = 0; i < kPaths; ++i) {
       const transport::LightSample light{{0.5F, 0.4F, 0.3F}, directions[i]};
       chunk.add(directions[i + 1], {&light, 1});
     }
     chunk.flush(sum, sum_of_squares);
     benchmark::DoNotOptimize(sum.data());
-  }
-  set_multiply_adds(state, 2.0 * static_cast<double>(chunk.size()) * kPaths);
+  });
 }
 BENCHMARK(transfer_sums_of_256)->Unit(benchmark::kMicrosecond);
 

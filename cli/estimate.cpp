@@ -14,12 +14,12 @@ namespace weft::cli {
 
 namespace {
 
-// Measured with the prototype on one core: directions of painted visibility (0.5 ms for 128 x 128
-// in dense weaves, 2.5 ms in a fleece), signed distance with projection, paths of the transfer
-// matrix.
-constexpr double kVisibilityPixelsPerSecond = 1.6e7;
-constexpr double kCoefficientsSecondsPerSegment = 2e-3;
-constexpr double kPathsPerSecond = 5e4;
+// Between what a core of docs/performance.md reached: directions of painted visibility (8e7 in dense
+// weaves, 2e7 in a fleece), signed distances with their fit, paths of the transfer matrix (5e4 with
+// many scatterings to 2.5e5).
+constexpr double kVisibilityPixelsPerSecond = 6e7;
+constexpr double kCoefficientsSecondsPerSegment = 2.5e-4;
+constexpr double kPathsPerSecond = 1.2e5;
 // Share of the room that straight yarns on top of each other would take: those of cloth are pressed
 // (0.7 to 1 measured).
 constexpr double kPressed = 0.85;

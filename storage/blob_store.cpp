@@ -95,15 +95,19 @@ std::filesystem::path BlobStore::trash_path_of(const core::Digest& digest) const
 
 core::Digest BlobStore::put(std::string_view data) {
   const core::Digest digest = core::digest_of(data);
+  put(digest, data);
+  return digest;
+}
+
+void BlobStore::put(const core::Digest& digest, std::string_view data) {
   // A file of another length is damaged and is written again; one of the right length is trusted
   // here and checked by get().
   if (use(digest) == data.size()) {
-    return digest;
+    return;
   }
   const std::filesystem::path path = path_of(digest);
   core::make_folder(path.parent_path());
   core::write_file_atomically(path, data);
-  return digest;
 }
 
 BlobStore::Batch::Batch(BlobStore& store)

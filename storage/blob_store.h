@@ -26,6 +26,8 @@ class BlobStore {
 
   // Stores `data` and returns its digest; durable on return. It counts as used now.
   core::Digest put(std::string_view data);
+  // Likewise. REQUIRES: `digest` is that of `data`.
+  void put(const core::Digest& digest, std::string_view data);
   // Many blobs that are durable together, and cost few syncs. Not committed, none of them is there.
   class Batch {
    public:

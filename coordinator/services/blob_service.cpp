@@ -127,7 +127,7 @@ grpc::Status BlobService::store(v1::WriteRequest& request,
       return {grpc::StatusCode::DATA_LOSS,
               "the bytes are not those of blob " + digest.hex() + "; nothing was stored"};
     }
-    scheduler_.blobs().put(request.data());
+    scheduler_.blobs().put(digest, request.data());
     return grpc::Status::OK;
   }
   return receive(digest, request, reader);
