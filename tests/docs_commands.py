@@ -6,14 +6,15 @@
     docs_commands.py SOURCE_DIR --print PAGE SCRIPT   prints what SCRIPT is to run of a page
     --keep FOLDER                                     keeps what PAGE wrote in FOLDER/PAGE
     --say                                             also shows the commands and what they print
-    --full                                            pictures at their own size
+    --full                                            pictures as the pages show them
 
 
 The blocks of a page run in one shell, in the order of the page, in an empty folder with a view of the
 sources (`examples`, `docs`, ..., and `build/bin`), with the programs on the PATH and a home of their own.
 The shell has namespaces of its own (unshare): ports that nobody else has, names such as hub.example
 that mean this machine, an empty /srv, sources that cannot be written, and no process that outlives it.
-What commands leave open is small there (SMALL, in the home's weft.toml); --full leaves it as it is.
+What commands leave open is small there (SMALL, in the home's weft.toml); with --full it is what docs/designer.md says,
+and `--full --keep FOLDER docs/designer.md` draws the pictures of that page anew.
 A command that does not end with 0 is a mistake. docs_blocks.py says what blocks look like and how those
 that need something else are marked. Exits with 77 (skipped) where no namespaces can be had.
 """
@@ -240,6 +241,13 @@ class Page:
         return {**kept, "PATH": f"{self.bin_dir}:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": str(scratch / "home"),
                 "TMPDIR": str(scratch / "tmp"), "USER": "ann", "__scratch": str(scratch)}
 
+    def settings(self):
+        if not self.full:
+            return SMALL
+        name = "docs/designer.md"
+        blocks, _ = docs_blocks.read_page(name, (self.source / name).read_text())
+        return next(block.text for block in blocks if block.language == "toml")
+
     def plan(self):
         """The script, and which outputs are held against which blocks."""
         session, shown, last = Session(self.name, self.say), [], None
@@ -271,7 +279,7 @@ class Page:
         try:
             for folder in ("home/.config/weft", "tmp", "work"):
                 (scratch / folder).mkdir(parents=True)
-            (scratch / "home/.config/weft/weft.toml").write_text("" if self.full else SMALL)
+            (scratch / "home/.config/weft/weft.toml").write_text(self.settings())
             view_of_sources(scratch / "work", self.source, self.bin_dir)
             names = sorted(set(re.findall(r"\b[a-z0-9-]+\.example\b", self.text))) + ["hub"]
             (scratch / "page.sh").write_text(script)

@@ -45,7 +45,7 @@ done
 
 if [ "$way" = --bootstrap ]; then
   # Everything that is mentioned as a dependency is fetched, and nothing else.
-  mmdebstrap --variant=apt bookworm "$work/root" >"$work/bootstrap.log" 2>&1 || {
+  mmdebstrap --variant=apt --skip=cleanup/apt/lists bookworm "$work/root" >"$work/bootstrap.log" 2>&1 || {
     tail "$work/bootstrap.log"
     exit 1
   }
@@ -60,6 +60,9 @@ mount --rbind /dev "$root/dev"
 mount -t proc -o subset=pid proc "$root/proc" 2>/dev/null || mount --rbind /proc "$root/proc"
 mount -t tmpfs -o mode=1777 tmpfs "$root/tmp"
 cp "${packages[@]}" "$root/tmp/"
+if [ "$way" = --bootstrap ]; then
+  cp /etc/resolv.conf "$root/etc/resolv.conf"
+fi
 inside() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/tmp/home "$@"; }
 if [ "$way" != --bootstrap ]; then
   # The build must not help: where it was there is nothing.
