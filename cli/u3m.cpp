@@ -108,7 +108,7 @@ class U3mWriter {
     front["transmission"] = scalar(means_.transmission, "transmission.png");
     front["metalness"] = constant(0);
     front["ior"] = constant((1 + std::sqrt(f0)) / (1 - std::sqrt(f0)));
-    front["specular_value"] = constant(f0 / 0.08);  // 1 stands for 8 %
+    front["specular_value"] = constant(std::min(1.0, f0 / 0.08));  // 1 stands for 8 %
     front["specular_tint"] = constant(0);
     front["sheen_value"] = constant(static_cast<double>(
         std::max({maps_.sheen_colour.x, maps_.sheen_colour.y, maps_.sheen_colour.z})));

@@ -146,13 +146,30 @@ TEST_F(WrittenFiles, OpenExrsAndOpenImageIosToolsReadPictures) {
   const std::string stats = output_of(folder(), {"oiiotool", "--stats", at("tiny.exr")});
   EXPECT_THAT(stats, HasSubstr("24 x   16"));
   EXPECT_THAT(stats, HasSubstr("NanCount: 0 0 0"));
-  for (const char* name : {"tiny.png", "maps/base_color.png", "maps/height.png"}) {
-    const std::string said = output_of(folder(), {"oiiotool", "--info", "-v", "--stats", at(name)});
-    EXPECT_THAT(said, HasSubstr("png")) << name;
-    if (std::string(name) == "maps/height.png") {
-      EXPECT_THAT(said, HasSubstr("uint16"));
-      EXPECT_THAT(said, HasSubstr("XResolution"));
-    }
+  const json about = json::parse(core::read_file(at("maps/maps.json")));
+  EXPECT_EQ(about["pictures"].size(), 9U);
+  std::vector<std::string> command = {"oiiotool", "--info", "-v", at("tiny.png")};
+  for (const auto& [name, meaning] : about["pictures"].items()) {
+    command.push_back(at("maps/" + name));
+  }
+  const std::string all = output_of(folder(), command);
+  EXPECT_THAT(all, HasSubstr("24 x   16, 3 channel, uint8 png"));
+  for (const auto& [name, meaning] : about["pictures"].items()) {
+    const std::size_t begin = all.find("Reading " + at("maps/" + name));
+    ASSERT_NE(begin, std::string::npos) << name;
+    const std::string said = all.substr(begin, all.find("Reading ", begin + 1) - begin);
+    const bool is_fine = name == "height.png" || name == "anisotropy_rotation.png";
+    EXPECT_THAT(said,
+                HasSubstr(std::string("24 x   24, ") + (name == "base_color.png" ? "4" : "3") +
+                          " channel, " + (is_fine ? "uint16" : "uint8") + " png"))
+        << name;
+    EXPECT_THAT(said, HasSubstr("tiny: " + meaning["meaning"].get<std::string>()));
+    // Pixels per inch: 24 on the tile's width.
+    const std::size_t density = said.find("XResolution: ");
+    ASSERT_NE(density, std::string::npos) << name;
+    EXPECT_NEAR(std::stod(said.substr(density + 13)), 24 * 25.4 / about["size_mm"][0].get<double>(),
+                0.1)
+        << name;
   }
 }
 
