@@ -19,6 +19,8 @@ constexpr int kMostCells = 512;
 constexpr float kRounding = 1.0001F;  // reaches are compared in single precision first
 constexpr double kShortest2 = 1e-24;  // squared length below which a piece is a point
 
+double clamped(double share) { return std::min(std::max(share, 0.0), 1.0); }
+
 // What the search reads of pieces, side by side by cell.
 struct Members {
   std::vector<float> x_mm;  // of the middle
@@ -89,6 +91,7 @@ class PieceGrid {
         }
       }
     }
+    keep_candidates(pairs);
   }
 
  private:
@@ -193,16 +196,28 @@ class PieceGrid {
   }
 
   void keep_if_close(std::uint32_t u, std::uint32_t v, glm::ivec2 wrap,
-                     std::vector<FibrePair>& pairs) const {
+                     std::vector<FibrePair>& pairs) {
     const FibrePair pair{u, v, wrap + tiles_[u] - tiles_[v]};
     if (same_fibre(pair)) {
       return;
     }
-    const double near = body_.pieces[u].radius_mm + body_.pieces[v].radius_mm + margin_mm_;
-    const glm::dvec3 gap = approach_of(body_, pair).gap_mm;
-    if (glm::dot(gap, gap) < near * near) {
-      pairs.push_back(pair);
+    candidates_.push_back(pair);
+    if (candidates_.size() == Approaches::kCount) {
+      keep_candidates(pairs);
     }
+  }
+
+  void keep_candidates(std::vector<FibrePair>& pairs) {
+    approaches_.measure(body_, candidates_);
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+      const FibrePair& pair = candidates_[i];
+      const double near =
+          body_.pieces[pair.u].radius_mm + body_.pieces[pair.v].radius_mm + margin_mm_;
+      if (approaches_.gap2(i) < near * near) {
+        pairs.push_back(pair);
+      }
+    }
+    candidates_.clear();
   }
 
   [[nodiscard]] bool same_fibre(const FibrePair& pair) const {
@@ -231,7 +246,9 @@ class PieceGrid {
   std::vector<double> reaches_;      // [piece]: from its midpoint, half the margin included
   std::vector<std::uint32_t> starts_;
   Members members_;
-  std::vector<std::uint8_t> near_;  // scratch
+  std::vector<std::uint8_t> near_;     // scratch
+  std::vector<FibrePair> candidates_;  // scratch, at most Approaches::kCount
+  Approaches approaches_;
 };
 
 }  // namespace
@@ -274,35 +291,60 @@ void FibreBody::write_to(Tile& tile) const {
   }
 }
 
-// Ericson, Real-Time Collision Detection (2005), section 5.1.9.
-Approach approach_of(const FibreBody& body, const FibrePair& pair) {
-  const FibreBody::Piece& u = body.pieces[pair.u];
-  const FibreBody::Piece& v = body.pieces[pair.v];
-  const glm::dvec3 p = body.begin_mm(u);
-  const glm::dvec3 q =
-      body.begin_mm(v) + glm::dvec3(pair.copy.x * body.size_mm.x, pair.copy.y * body.size_mm.y, 0);
-  const glm::dvec3 along_u = body.end_mm(u) - p;
-  const glm::dvec3 along_v = body.end_mm(v) - body.begin_mm(v);
-  const glm::dvec3 between = p - q;
-  const double uu = std::max(glm::dot(along_u, along_u), kShortest2);
-  const double vv = std::max(glm::dot(along_v, along_v), kShortest2);
-  const double uv = glm::dot(along_u, along_v);
-  const double ub = glm::dot(along_u, between);
-  const double vb = glm::dot(along_v, between);
-  const double denominator = uu * vv - uv * uv;
-  Approach approach;
-  if (denominator > 1e-12 * uu * vv) {
-    approach.at_u = std::clamp((uv * vb - ub * vv) / denominator, 0.0, 1.0);
-  } else {
-    approach.at_u = 0.5;  // parallel: any place is as close, the middle moves both ends
+// Ericson, Real-Time Collision Detection (2005), section 5.1.9, without a branch.
+std::size_t Approaches::measure(const FibreBody& body, std::span<const FibrePair> pairs) {
+  const std::size_t count = std::min(kCount, pairs.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const FibrePair& pair = pairs[i];
+    const FibreBody::Piece& u = body.pieces[pair.u];
+    const FibreBody::Piece& v = body.pieces[pair.v];
+    const glm::dvec3 p = body.begin_mm(u);
+    const glm::dvec3 q = body.begin_mm(v);
+    const glm::dvec3 copy(pair.copy.x * body.size_mm.x, pair.copy.y * body.size_mm.y, 0);
+    const glm::dvec3 along_u = body.end_mm(u) - p;
+    const glm::dvec3 along_v = body.end_mm(v) - q;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto at = static_cast<std::size_t>(axis);
+      p_[at][i] = p[axis];
+      q_[at][i] = q[axis] + copy[axis];
+      along_u_[at][i] = along_u[axis];
+      along_v_[at][i] = along_v[axis];
+    }
   }
-  approach.at_v = (uv * approach.at_u + vb) / vv;
-  if (approach.at_v < 0 || approach.at_v > 1) {
-    approach.at_v = std::clamp(approach.at_v, 0.0, 1.0);
-    approach.at_u = std::clamp((uv * approach.at_v - ub) / uu, 0.0, 1.0);
+  for (std::size_t i = 0; i < kCount; ++i) {  // all of them: what is left from before does no harm
+    const double ux = along_u_[0][i];
+    const double uy = along_u_[1][i];
+    const double uz = along_u_[2][i];
+    const double vx = along_v_[0][i];
+    const double vy = along_v_[1][i];
+    const double vz = along_v_[2][i];
+    const double bx = p_[0][i] - q_[0][i];
+    const double by = p_[1][i] - q_[1][i];
+    const double bz = p_[2][i] - q_[2][i];
+    const double uu = std::max(ux * ux + uy * uy + uz * uz, kShortest2);
+    const double vv = std::max(vx * vx + vy * vy + vz * vz, kShortest2);
+    const double uv = ux * vx + uy * vy + uz * vz;
+    const double ub = ux * bx + uy * by + uz * bz;
+    const double vb = vx * bx + vy * by + vz * bz;
+    const double denominator = uu * vv - uv * uv;
+    const double crossing = clamped((uv * vb - ub * vv) / denominator);
+    // Parallel: any place is as close, the middle moves both ends.
+    const double first_u = denominator > 1e-12 * uu * vv ? crossing : 0.5;
+    const double free_v = (uv * first_u + vb) / vv;
+    const double at_v = clamped(free_v);
+    const double back_u = clamped((uv * at_v - ub) / uu);
+    const double at_u = free_v == at_v ? first_u : back_u;
+    const double x = q_[0][i] + vx * at_v - p_[0][i] - ux * at_u;
+    const double y = q_[1][i] + vy * at_v - p_[1][i] - uy * at_u;
+    const double z = q_[2][i] + vz * at_v - p_[2][i] - uz * at_u;
+    at_u_[i] = at_u;
+    at_v_[i] = at_v;
+    gap_[0][i] = x;
+    gap_[1][i] = y;
+    gap_[2][i] = z;
+    gap2_[i] = x * x + y * y + z * z;
   }
-  approach.gap_mm = q + along_v * approach.at_v - p - along_u * approach.at_u;
-  return approach;
+  return count;
 }
 
 std::vector<FibrePair> close_pairs(const FibreBody& body, double margin_mm) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -89,22 +90,12 @@ class Untangling {
   void push_apart() {
     corrections_mm_.assign(body_.nodes_mm.size(), glm::dvec3(0));
     weights_.assign(body_.nodes_mm.size(), 0);
-    for (const FibrePair& pair : pairs_) {
-      const FibreBody::Piece& u = body_.pieces[pair.u];
-      const FibreBody::Piece& v = body_.pieces[pair.v];
-      const Approach approach = approach_of(body_, pair);
-      const double apart = u.radius_mm + v.radius_mm;
-      const double gap2 = glm::dot(approach.gap_mm, approach.gap_mm);
-      if (gap2 >= apart * apart) {
-        continue;
+    for (std::span<const FibrePair> left = pairs_; !left.empty();) {
+      const std::size_t count = approaches_.measure(body_, left);
+      for (std::size_t i = 0; i < count; ++i) {
+        push_apart(left[i], i);
       }
-      const double gap = std::sqrt(gap2);
-      const glm::dvec3 away = gap2 > kTouching2 * apart * apart
-                                  ? approach.gap_mm / gap
-                                  : any_across(body_.end_mm(u) - body_.begin_mm(u));
-      const glm::dvec3 move = away * (0.5 * (apart - gap));
-      give(u, approach.at_u, -move);
-      give(v, approach.at_v, move);
+      left = left.subspan(count);
     }
     for (std::size_t n = 0; n < body_.nodes_mm.size(); ++n) {
       if (weights_[n] > 0) {
@@ -114,6 +105,25 @@ class Untangling {
         body_.nodes_mm[n] += length > most ? move * (most / length) : move;
       }
     }
+  }
+
+  // The pair whose approach is the i-th of approaches_.
+  void push_apart(const FibrePair& pair, std::size_t i) {
+    const FibreBody::Piece& u = body_.pieces[pair.u];
+    const FibreBody::Piece& v = body_.pieces[pair.v];
+    const double apart = u.radius_mm + v.radius_mm;
+    const double gap2 = approaches_.gap2(i);
+    if (gap2 >= apart * apart) {
+      return;
+    }
+    const Approach approach = approaches_[i];
+    const double gap = std::sqrt(gap2);
+    const glm::dvec3 away = gap2 > kTouching2 * apart * apart
+                                ? approach.gap_mm / gap
+                                : any_across(body_.end_mm(u) - body_.begin_mm(u));
+    const glm::dvec3 move = away * (0.5 * (apart - gap));
+    give(u, approach.at_u, -move);
+    give(v, approach.at_v, move);
   }
 
   // Moves the place at `share` of the piece by `move`, with the least motion of its ends.
@@ -153,6 +163,7 @@ class Untangling {
   std::vector<double> radii_mm_;  // [node]
   double thinnest_mm_ = 0;
   std::vector<FibrePair> pairs_;
+  Approaches approaches_;
   std::vector<glm::dvec3> listed_mm_;  // the nodes when the list was made
   std::vector<glm::dvec3> corrections_mm_;
   std::vector<double> weights_;

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
@@ -141,21 +143,32 @@ TEST(Untangle, ClosePairsAreThoseOfAllPairs) {
   const Tile tile = build_tile(describe(kPlain));
   const FibreBody body(tile);
   const double margin = 0.01;
-  std::size_t expected = 0;
+  std::vector<FibrePair> all;
   for (std::uint32_t u = 0; u < body.pieces.size(); u += 7) {
     for (std::uint32_t v = 0; v < body.pieces.size(); ++v) {
       for (int x = -2; x <= 2; ++x) {
         for (int y = -2; y <= 2; ++y) {
-          const FibrePair pair{u, v, {x, y}};
           const glm::ivec2 period = body.strand_periods[body.pieces[u].strand];
           const bool same = body.pieces[u].strand == body.pieces[v].strand &&
                             x * period.y == y * period.x &&
                             (period != glm::ivec2(0, 0) || (x == 0 && y == 0));
-          const double near = body.pieces[u].radius_mm + body.pieces[v].radius_mm + margin;
-          expected += !same && glm::length(approach_of(body, pair).gap_mm) < near ? 1 : 0;
+          if (!same) {
+            all.push_back({u, v, {x, y}});
+          }
         }
       }
     }
+  }
+  std::size_t expected = 0;
+  Approaches approaches;
+  for (std::span<const FibrePair> left = all; !left.empty();) {
+    const std::size_t count = approaches.measure(body, left);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double near =
+          body.pieces[left[i].u].radius_mm + body.pieces[left[i].v].radius_mm + margin;
+      expected += approaches.gap2(i) < near * near ? 1 : 0;
+    }
+    left = left.subspan(count);
   }
   std::size_t found = 0;
   for (const FibrePair& pair : close_pairs(body, margin)) {
@@ -163,6 +176,45 @@ TEST(Untangle, ClosePairsAreThoseOfAllPairs) {
   }
   EXPECT_GT(expected, 1000U);
   EXPECT_EQ(found, expected);
+}
+
+TEST(Untangle, ApproachesAreTheNearestOfManyPlaces) {
+  const Tile tile = build_tile(describe(kPlain));
+  const FibreBody body(tile);
+  const auto count = static_cast<std::uint32_t>(body.pieces.size());
+  std::vector<FibrePair> pairs;
+  for (std::uint32_t n = 0; n < 100; ++n) {
+    pairs.push_back({n * 31 % count, n * 17 % count, {n % 3 == 0 ? 1 : 0, 0}});
+  }
+  pairs.push_back({0, 0, {0, 1}});  // parallel
+  Approaches approaches;
+  for (std::span<const FibrePair> left = pairs; !left.empty();) {
+    const std::size_t measured = approaches.measure(body, left);
+    ASSERT_EQ(measured, std::min(left.size(), Approaches::kCount));
+    for (std::size_t i = 0; i < measured; ++i) {
+      const FibreBody::Piece& u = body.pieces[left[i].u];
+      const FibreBody::Piece& v = body.pieces[left[i].v];
+      const glm::dvec3 copy(left[i].copy.x * body.size_mm.x, left[i].copy.y * body.size_mm.y, 0);
+      const auto gap = [&](double at_u, double at_v) {
+        return glm::mix(body.begin_mm(v), body.end_mm(v), at_v) + copy -
+               glm::mix(body.begin_mm(u), body.end_mm(u), at_u);
+      };
+      double nearest = 1e300;
+      constexpr int kSteps = 50;
+      for (int a = 0; a <= kSteps; ++a) {
+        for (int b = 0; b <= kSteps; ++b) {
+          nearest = std::min(nearest, glm::length(gap(a / double{kSteps}, b / double{kSteps})));
+        }
+      }
+      const Approach approach = approaches[i];
+      EXPECT_NEAR(glm::length(approach.gap_mm - gap(approach.at_u, approach.at_v)), 0, 1e-12);
+      EXPECT_NEAR(std::sqrt(approaches.gap2(i)), glm::length(approach.gap_mm), 1e-12);
+      const double step = glm::length(body.end_mm(u) - body.begin_mm(u)) / kSteps;
+      EXPECT_LE(glm::length(approach.gap_mm), nearest + 1e-12);
+      EXPECT_GE(glm::length(approach.gap_mm), nearest - 2 * step);
+    }
+    left = left.subspan(measured);
+  }
 }
 
 TEST(Untangle, PointsInASectionKeepApart) {
