@@ -175,6 +175,21 @@ class Reader:
         self.blocks.append(block)
 
 
+# A file of ours that the prose names.
+NAMED_FILE = re.compile(r"`([\w.-]+/[\w./-]+\.(?:h|cpp|comp|md|sh|py|proto|textproto|yaml|txt|js|json))`")
+
+
+def files_that_are_not_there(page, text, source):
+    """Sentences about files of the source tree that the page names and that do not exist."""
+    mistakes = []
+    for number, line in enumerate(text.splitlines(), 1):
+        for name in NAMED_FILE.findall(line):
+            ours = (source / name.split("/")[0]).is_dir() and not name.startswith(("build/", "out/"))
+            if ours and not (source / name).exists() and "generated" not in line:
+                mistakes.append(f"{page}:{number}: there is no {name}")
+    return mistakes
+
+
 def read_page(page, text):
     """The blocks of a page, and sentences about what is wrong with them."""
     return Reader(page, text).read()

@@ -2,7 +2,7 @@
 """Runs the commands of the documentation as they are written.
 
     docs_commands.py SOURCE_DIR BIN_DIR [PAGE...]     runs pages, such as docs/slurm.md; default: all
-    docs_commands.py SOURCE_DIR --check               reads all pages: every block says what it is
+    docs_commands.py SOURCE_DIR --check               reads all pages: blocks say what they are, files are there
     docs_commands.py SOURCE_DIR --print PAGE SCRIPT   prints what SCRIPT is to run of a page
     --keep FOLDER                                     keeps what PAGE wrote in FOLDER/PAGE
     --say                                             also shows the commands and what they print
@@ -326,8 +326,9 @@ def check(source, names):
     """Reads pages without running anything."""
     mistakes, counts = [], {"run": 0, "elsewhere": 0, "not": 0}
     for name in names:
-        blocks, wrong = docs_blocks.read_page(name, (source / name).read_text())
-        mistakes += wrong
+        text = (source / name).read_text()
+        blocks, wrong = docs_blocks.read_page(name, text)
+        mistakes += wrong + docs_blocks.files_that_are_not_there(name, text, source)
         for block in blocks:
             if block.language not in docs_blocks.RUN or block.hidden:
                 continue

@@ -66,6 +66,7 @@ BAD = {
     "a block without an end": ("```sh\ntrue\n", "does not end"),
     "a test that runs it not": ("<!-- run: by tests/none.sh, in a root -->\n```sh\ntrue\n```\n",
                                 "tests/none.sh does not run it"),
+    "a file that is not there": ("See `docs/none.md`.\n", "there is no docs/none.md"),
     "sources that are written": ("```sh\ntouch docs/page.md.new\n```\n", "page.md:2: ended with 1"),
 }
 
