@@ -86,9 +86,9 @@ void export_fabric(const CommandOptions& options) {
     print_json(summary);
     return;
   }
-  std::printf("%s: %llu curves, %llu segments, %s\n", options.out.c_str(),
-              static_cast<unsigned long long>(tile.strands.size() * copies),
-              static_cast<unsigned long long>(tile.segment_count() * copies),
+  std::printf("%s: %s curves, %s segments, %s\n", options.out.c_str(),
+              std::to_string(tile.strands.size() * copies).c_str(),
+              std::to_string(tile.segment_count() * copies).c_str(),
               format_bytes(bytes.size()).c_str());
 }
 

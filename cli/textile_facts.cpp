@@ -117,6 +117,7 @@ std::vector<Fibre> composition(const fabric::Tile& tile) {
     all += volume;
   }
   std::vector<Fibre> fibres;
+  fibres.reserve(volumes.size());
   for (const auto& [word, volume] : volumes) {
     fibres.push_back({{word.first, word.second}, volume / all});
   }
