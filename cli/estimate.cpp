@@ -14,9 +14,9 @@ namespace weft::cli {
 
 namespace {
 
-// Between what a core of docs/performance.md reached: directions of painted visibility (8e7 in dense
-// weaves, 2e7 in a fleece), signed distances with their fit, paths of the transfer matrix (5e4 with
-// many scatterings to 2.5e5).
+// Between what a core of docs/performance.md reached: directions of painted visibility (8e7 in
+// dense weaves, 2e7 in a fleece), signed distances with their fit, paths of the transfer matrix
+// (5e4 with many scatterings to 2.5e5).
 constexpr double kVisibilityPixelsPerSecond = 6e7;
 constexpr double kCoefficientsSecondsPerSegment = 2.5e-4;
 constexpr double kPathsPerSecond = 1.2e5;
