@@ -22,7 +22,9 @@ class DatabaseDiffTest : public testing::Test {
     }
     return differences;
   }
-  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "weft_database_diff";
+  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) /
+                                  (std::string("weft_database_diff_") +
+                                   testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
 TEST_F(DatabaseDiffTest, NamesWhatDiffersAndByHowMuch) {
