@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The tests that take long: tests/long.sh [SEEDS [FIRST_SEED [FUZZ_SECONDS]]]
 # Simulated clusters (default: 10000 seeds from 1001 on), real processes that are killed again and
-# again and every flip of a byte (WEFT_LONG=1), the packages in a fresh Debian (with mmdebstrap), and
+# again and every flip of a byte (WEFT_LONG=1), packages and containers in a fresh Debian (mmdebstrap), and
 # fuzzing (default: 600 s for each target; 0: none).
 # Wants a built tree (tests/run.sh --build-only). Prints the time that each part took.
 set -euo pipefail
@@ -49,6 +49,12 @@ if command -v mmdebstrap >/dev/null; then
   part packages_in_a_fresh_debian tests/packages.sh build --bootstrap
 else
   echo "== packages_in_a_fresh_debian: skipped, mmdebstrap is not installed"
+fi
+has_all() { for program in "$@"; do command -v "$program" >/dev/null || return 1; done; }
+if has_all buildah podman crun mmdebstrap; then
+  part containers tests/container.sh build
+else
+  echo "== containers: skipped, not all of buildah, podman, crun and mmdebstrap are installed"
 fi
 if [ "$fuzz_seconds" -gt 0 ]; then
   part fuzzing fuzz/run.sh "$fuzz_seconds"
