@@ -76,7 +76,7 @@ void Queue::give(const Run& run, const WorkerState& worker, Time now, Actions& a
   const double threads = std::min<double>(worker.threads, static_cast<double>(run.shards));
   attempt.charged_ms = stage.shard_thread_ms > 0
                            ? stage.shard_thread_ms * static_cast<double>(run.shards)
-                           : threads * settings_.shortest_run_ms;
+                           : threads * settings_.unmeasured_run_ms;
   shares_.charge(job.demands.user, job.id, attempt.charged_ms);
   CHECK_GT(take_shards(attempt), 0U);
   job.speculative_attempts += run.purpose == Purpose::kSpeculation ? 1 : 0;

@@ -19,10 +19,12 @@ using Time = core::Clock::Time;
 
 struct QueueSettings {
   std::uint32_t lease_ms = 30'000;
-  // Runs are sized to this much wall time, as measured, and to no less than shortest_run_ms when
-  // the last shards of a stage are shared out.
+  // Runs are sized to this much wall time, as measured, and to no less than last_run_ms when the
+  // last shards of a stage are shared out: so long is nobody idle at most while another ends.
   std::uint32_t target_run_ms = 20'000;
-  std::uint32_t shortest_run_ms = 5'000;
+  std::uint32_t last_run_ms = 500;
+  // What a run is taken for of whose stage nothing is measured.
+  std::uint32_t unmeasured_run_ms = 5'000;
   std::uint64_t run_limit_shards = 4'096;
   // A shard is quarantined, and its job fails, after so many failures, or the same error on so many
   // workers, or so many lost workers that ran nothing else of the stage beside it.

@@ -133,7 +133,7 @@ std::uint64_t Queue::run_size(const JobState& job, const StageState& stage,
 }
 
 // As many shards as the worker does in target_run_ms, but no more than its share, or than it does
-// in shortest_run_ms if that is more (a share of 0: no limit); and no more than it has time for.
+// in last_run_ms if that is more (a share of 0: no limit); and no more than it has time for.
 std::uint64_t Queue::sized(const StageState& stage, const WorkerState& worker, std::uint64_t share,
                            Time now) const {
   if (stage.shard_thread_ms <= 0) {
@@ -147,7 +147,7 @@ std::uint64_t Queue::sized(const StageState& stage, const WorkerState& worker, s
   };
   std::uint64_t size = shards_in(settings_.target_run_ms);
   if (share > 0) {
-    size = std::min(size, std::max(share, shards_in(settings_.shortest_run_ms)));
+    size = std::min(size, std::max(share, shards_in(settings_.last_run_ms)));
   }
   size = std::max<std::uint64_t>(size, share > 0 ? 1 : worker.threads);
   if (worker.wall_left_ms != 0) {
