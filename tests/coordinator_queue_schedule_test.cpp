@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "tests/queue_cluster.h"
@@ -10,6 +13,7 @@ namespace {
 
 class QueueSchedule : public testing::Test {
  protected:
+  explicit QueueSchedule(QueueSettings settings = {}) : cluster_(settings) {}
   // Of which job the worker is given something next, in so many turns.
   std::string turns(QueueWorker& worker, int count) {
     std::string jobs;
@@ -204,10 +208,41 @@ TEST_F(QueueSchedule, UnfinishedJobs_AreCountedByUser) {
   EXPECT_EQ(cluster_.queue.unfinished_jobs_of("u"), 1U);
 }
 
+TEST_F(QueueSchedule, Runs_GetShorterTowardsTheEndOfAStage) {
+  cluster_.submit("a", {1000, 1});
+  QueueWorker other(cluster_, "other", 1);
+  worker_.sync(1);
+  worker_.finish(100);  // each shard takes 0.1 s
+  worker_.sync(1);
+  other.sync(1);
+  std::vector<std::uint64_t> sizes;
+  while (!cluster_.job("a").stages[0].is_done()) {
+    for (QueueWorker* const worker : {&worker_, &other}) {
+      if (!worker->held.empty()) {
+        sizes.push_back(worker->held[0].shards);
+        worker->finish(100 * worker->held[0].shards);
+      }
+      worker->sync(1);
+    }
+    ASSERT_LT(sizes.size(), 1000U);
+  }
+  // 20 seconds at first; the last ones no longer than half a second.
+  EXPECT_EQ(*std::max_element(sizes.begin(), sizes.end()), 200U);
+  EXPECT_TRUE(std::is_sorted(sizes.rbegin(), sizes.rend()));
+  EXPECT_LE(sizes.back(), 5U);
+}
+
 // ---- slow and hung attempts
 
 class QueueWatch : public QueueSchedule {
  protected:
+  // Runs that are not cut up towards the end of a stage.
+  QueueWatch()
+      : QueueSchedule([] {
+          QueueSettings settings;
+          settings.last_run_ms = 5'000;
+          return settings;
+        }()) {}
   // The worker holds one run that should take 4 s; nothing else is pending.
   void begin_slow_run() {
     cluster_.submit("a", {5, 1});
