@@ -214,7 +214,7 @@ void add_certs(CLI::App& app) {
       ->check(CLI::IsMember({"reader", "submitter", "worker", "admin"}));
   command->add_option("--host", options->hosts,
                       "A name or an address by which others call this server; may be repeated");
-  command->add_option("--out", options->out,
+  command->add_option("-o,--output,--out", options->out,
                       "Folder to write; default: NAME beside the authority's");
   add_days(*command, *options, kDays);
 

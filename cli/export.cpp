@@ -102,7 +102,7 @@ void add_export(CLI::App& app) {
                   "Example: weft export silk.textproto -o silk.bcc");
   command->add_option("fabric", options->fabric, "Fabric description (.textproto or .json)")
       ->required();
-  command->add_option("-o,--out", options->out, "File to write")->required();
+  command->add_option("-o,--output,--out", options->out, "File to write")->required();
   command
       ->add_option(
           "--format", options->format,

@@ -249,7 +249,8 @@ void add_import(CLI::App& app) {
       ->add_option("draft", command->draft,
                    "Weaving draft: .wif, Fiberworks .dtx or WeavePoint .wpo; or curves: .bcc")
       ->required();
-  import_app->add_option("-o,--out", command->out, "Description to write (.textproto)")->required();
+  import_app->add_option("-o,--output,--out", command->out, "Description to write (.textproto)")
+      ->required();
   import_app->add_option("--name", command->name, "Name of the fabric (default: the file's)");
   KindOptions kinds;
   kinds.of_drafts = {import_app->add_option("--crop-ends", command->crop_ends,

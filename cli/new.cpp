@@ -154,7 +154,7 @@ void add_new(CLI::App& app) {
                           "A fabric (silk_plain, gabardine, ...) or a yarn (cotton1, ...)");
   CLI::Option* list = new_app->add_flag("--list", command->list, "List the presets");
   preset->excludes(list);
-  new_app->add_option("-o,--out", command->out, "Description to write (.textproto)")
+  new_app->add_option("-o,--output,--out", command->out, "Description to write (.textproto)")
       ->excludes(list);
   new_app->add_flag("--force", command->force, "Replace a file that exists");
   new_app->add_flag("--json", command->json, "Print one JSON value");

@@ -133,7 +133,7 @@ void add_preview(CLI::App& app) {
                                   "Example: weft preview silk.textproto -o silk.png");
   command->add_option("fabric", options->fabric, "Fabric description (.textproto or .json)")
       ->required();
-  command->add_option("-o,--out", options->out, "Picture to write (.png)")->required();
+  command->add_option("-o,--output,--out", options->out, "Picture to write (.png)")->required();
   command->add_option("--view", options->view, "What to draw: top, oblique or both side by side")
       ->check(CLI::IsMember({"top", "oblique", "both"}))
       ->capture_default_str();

@@ -89,8 +89,9 @@ OptionDoc describe(const CLI::Option& option) {
   for (const std::string& name : option.get_snames()) {
     doc.names.push_back("-" + name);
   }
-  for (const std::string& name : option.get_lnames()) {
-    doc.names.push_back("--" + name);
+  // Further ones are names that it had once: they are understood, and not told of.
+  if (!option.get_lnames().empty()) {
+    doc.names.push_back("--" + option.get_lnames().front());
   }
   doc.value = value_name(option);
   return doc;

@@ -122,7 +122,7 @@ void check_out(const TlsFolder& out, const std::string& name) {
   if (there.name != name) {
     throw core::Error(core::Code::kInvalidArgument, out.path.string() +
                                                         " holds the certificate of '" + there.name +
-                                                        "'; name another folder with --out");
+                                                        "'; name another folder with --output");
   }
 }
 
