@@ -1,5 +1,8 @@
 #pragma once
 
+#include <functional>
+#include <vector>
+
 #include "coordinator/journal/journal.h"
 #include "coordinator/queue/queue.h"
 #include "proto/weft/v1/cluster.pb.h"
@@ -27,7 +30,9 @@ void check_priority(std::int32_t priority);
 // The job as people see it; comment, version and the like are the caller's.
 [[nodiscard]] v1::Job message_of(const Queue& queue, const JobState& job, Time now);
 [[nodiscard]] v1::AttemptInfo message_of(const KeptAttempt& attempt);
-[[nodiscard]] v1::Worker message_of(const Queue& queue, const WorkerState& worker, Time now);
+// The workers for which `is_wanted` says so, by id, with what they run.
+[[nodiscard]] std::vector<v1::Worker> messages_of_workers(
+    const Queue& queue, Time now, const std::function<bool(const WorkerState&)>& is_wanted);
 
 [[nodiscard]] std::int64_t to_ms(Time time);
 

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <string>
+#include <unordered_map>
 
 #include "coordinator/scheduler/messages.h"
 
@@ -181,7 +183,9 @@ v1::AttemptInfo message_of(const KeptAttempt& attempt) {
   return message;
 }
 
-v1::Worker message_of(const Queue& queue, const WorkerState& worker, Time now) {
+namespace {
+
+v1::Worker without_attempts(const Queue& queue, const WorkerState& worker, Time now) {
   v1::Worker message;
   message.set_id(worker.id);
   message.set_name(worker.name);
@@ -200,22 +204,42 @@ v1::Worker message_of(const Queue& queue, const WorkerState& worker, Time now) {
   message.set_wall_left_ms(worker.wall_left_ms);
   message.set_superseded(worker.superseded);
   message.set_undelivered(worker.undelivered);
-  for (const auto& [id, attempt] : queue.attempts()) {
-    if (attempt.worker != worker.id) {
-      continue;
-    }
-    const JobState& job = *queue.job(attempt.job);
-    v1::WorkerAttempt& entry = *message.add_attempts();
-    entry.mutable_name()->set_job_id(attempt.job);
-    entry.mutable_name()->set_attempt(id);
-    entry.set_fabric(job.fabric);
-    entry.set_stage(to_string(job.stages[attempt.stage].name));
-    entry.set_first_shard(attempt.first_shard);
-    entry.set_shards(attempt.shards);
-    entry.set_shards_done(attempt.shards_done);
-    entry.set_last_line(attempt.last_line);
-  }
   return message;
+}
+
+v1::WorkerAttempt message_of(const Queue& queue, std::uint64_t id, const Attempt& attempt) {
+  const JobState& job = *queue.job(attempt.job);
+  v1::WorkerAttempt entry;
+  entry.mutable_name()->set_job_id(attempt.job);
+  entry.mutable_name()->set_attempt(id);
+  entry.set_fabric(job.fabric);
+  entry.set_stage(to_string(job.stages[attempt.stage].name));
+  entry.set_first_shard(attempt.first_shard);
+  entry.set_shards(attempt.shards);
+  entry.set_shards_done(attempt.shards_done);
+  entry.set_last_line(attempt.last_line);
+  return entry;
+}
+
+}  // namespace
+
+std::vector<v1::Worker> messages_of_workers(
+    const Queue& queue, Time now, const std::function<bool(const WorkerState&)>& is_wanted) {
+  std::vector<v1::Worker> messages;
+  std::unordered_map<std::string, std::size_t> message_of_worker;
+  for (const auto& [id, worker] : queue.workers()) {
+    if (is_wanted(worker)) {
+      message_of_worker.emplace(id, messages.size());
+      messages.push_back(without_attempts(queue, worker, now));
+    }
+  }
+  for (const auto& [id, attempt] : queue.attempts()) {
+    const auto found = message_of_worker.find(attempt.worker);
+    if (found != message_of_worker.end()) {
+      *messages[found->second].add_attempts() = message_of(queue, id, attempt);
+    }
+  }
+  return messages;
 }
 
 }  // namespace weft::coordinator

@@ -195,10 +195,8 @@ bool Scheduler::was_given(const std::string& job_id, std::uint64_t attempt,
 
 std::vector<v1::Worker> Scheduler::workers() {
   const std::lock_guard lock(mutex_);
-  std::vector<v1::Worker> workers;
-  for (const auto& [id, worker] : queue_.workers()) {
-    workers.push_back(message_of(queue_, worker, clock_.now()));
-  }
+  std::vector<v1::Worker> workers =
+      messages_of_workers(queue_, clock_.now(), [](const WorkerState&) { return true; });
   std::stable_sort(workers.begin(), workers.end(),
                    [](const v1::Worker& a, const v1::Worker& b) { return a.name() < b.name(); });
   return workers;
@@ -283,12 +281,8 @@ std::vector<v1::Worker> Scheduler::change_worker(const Order& order, const Chang
     orders_.add(order.request_id);
     ticket = change(name, {OrderRecord{order.request_id}});
   }
-  std::vector<v1::Worker> workers;
-  for (const auto& [id, worker] : queue_.workers()) {
-    if (worker.name == name) {
-      workers.push_back(message_of(queue_, worker, clock_.now()));
-    }
-  }
+  std::vector<v1::Worker> workers = messages_of_workers(
+      queue_, clock_.now(), [&](const WorkerState& worker) { return worker.name == name; });
   lock.unlock();
   journal_.wait(ticket);
   return workers;
