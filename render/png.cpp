@@ -13,19 +13,10 @@
 #include "core/input_file.h"
 #include "core/sandbox.h"
 #include "render/files/png_parser.h"
+#include "shading/tone_curve.h"
 
 namespace weft::render {
 namespace {
-
-constexpr float kShoulder = 0.8f;  // below it tones are kept as they are
-
-float rolled_off(float value) {
-  if (value <= kShoulder) {
-    return value;
-  }
-  const float room = 1 - kShoulder;
-  return 1 - room * std::exp(-(value - kShoulder) / room);
-}
 
 void append(png_structp png, png_bytep data, png_size_t size) {
   auto* out = static_cast<std::string*>(png_get_io_ptr(png));
@@ -161,7 +152,8 @@ std::vector<std::uint8_t> tone_mapped(const Image& image, float exposure_stops) 
   for (const glm::vec3& pixel : image.pixels) {
     for (int c = 0; c < 3; ++c) {
       const float value = pixel[c] * scale;
-      const float shown = value > 0 ? srgb_encoded(rolled_off(value)) : 0;  // NaN is not above 0
+      const float shown =
+          value > 0 ? srgb_encoded(shading::rolled_off(value)) : 0;  // NaN is not above 0
       rgb.push_back(static_cast<std::uint8_t>(std::lround(255 * std::fmin(shown, 1.0f))));
     }
   }

@@ -8,25 +8,18 @@
 
 #include "core/check.h"
 #include "core/error.h"
+#include "shading/tone_curve.h"
 
 namespace weft::coordinator {
 
 namespace {
 
-constexpr float kShoulder = 0.8F;     // below it tones are kept as they are
 constexpr double kMiddleTone = 0.25;  // linear
 constexpr float kWhite = 65535;       // of libpng's 16-bit linear samples
 
-float rolled_off(float value) {
-  if (value <= kShoulder) {
-    return value;
-  }
-  const float room = 1 - kShoulder;
-  return 1 - room * std::exp(-(value - kShoulder) / room);
-}
-
 png_uint_16 sample_of(float value) {
-  return value > 0 ? static_cast<png_uint_16>(std::lround(kWhite * std::fmin(rolled_off(value), 1)))
+  return value > 0 ? static_cast<png_uint_16>(
+                         std::lround(kWhite * std::fmin(shading::rolled_off(value), 1)))
                    : png_uint_16{0};  // NaN is not above 0
 }
 
