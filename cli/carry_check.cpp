@@ -3,57 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
-#include <vector>
 
-#include <google/protobuf/util/json_util.h>
-#include <nlohmann/json.hpp>
-
-#include "core/error.h"
 #include "core/moments.h"
-#include "core/random.h"
-#include "proto/weft/v1/task.pb.h"
-#include "render/fabric.h"
-#include "shading/fibre_bcsdf.h"
-#include "transport/scene.h"
-#include "transport/seen_segments.h"
-#include "transport/transfer.h"
 
 namespace weft::cli {
 
 namespace {
 
-constexpr std::size_t kMostCells = 48;
-constexpr std::uint64_t kPathsPerCell = 2048;
-// core::derive_seed of the description's seed: none of the paths that the base was made from.
-constexpr std::uint32_t kPurposeOfCheck = 0x636865;  // "che"
-
-// How the grid's stage weighed segments. The text came with the file.
-v1::GridSpec grid_spec_of(const std::string& stages_json) {
-  constexpr int kDeepest = 16;
-  constexpr std::uint32_t kMostRays = 1024;
-  using Json = nlohmann::json;
-  const auto is_shallow = [](int depth, Json::parse_event_t, Json&) { return depth <= kDeepest; };
-  const Json json = Json::parse(stages_json, is_shallow, false);
-  const bool has_stages =
-      json.is_object() && json.contains("stages") && json.at("stages").is_array();
-  for (const Json& stage : has_stages ? json.at("stages") : Json::array()) {
-    if (!stage.is_object() || !stage.contains("name") || stage.at("name") != "grid" ||
-        !stage.contains("spec")) {
-      continue;
-    }
-    v1::TaskSpec spec;
-    const bool is_spec =
-        google::protobuf::util::JsonStringToMessage(stage.at("spec").dump(), &spec).ok();
-    if (is_spec && spec.grid().seen_rays_per_segment() >= 1 &&
-        spec.grid().seen_rays_per_segment() <= kMostRays) {
-      return spec.grid();
-    }
-  }
-  throw core::Error(core::Code::kDataLoss,
-                    "dataset /provenance/stages does not say how the grid was made; make the "
-                    "fabric again");
-}
+constexpr SamplePlan kPlanOfCheck{48, 2048, 0.5, 0x636865};  // "che"
 
 // Sums over the cells, by channel and over all.
 struct Comparison {
@@ -109,30 +66,14 @@ CarryError error_of(const Comparison& comparison, std::size_t cells) {
 }  // namespace
 
 CarryError check_carried(const storage::FabricDatabase& database,
-                         const v1::FabricDescription& description) {
-  const v1::GridSpec grid = grid_spec_of(database.stages_json);
-  const fabric::Tile tile = render::tile_of(database);
-  const transport::Scene scene(tile);
-  const std::size_t cells = database.cell_paths.size();
-  const std::vector<transport::CellSegments> segments = transport::segments_by_cell(
-      database.cell_of_segment, cells,
-      transport::seen_segments(scene, grid.seen_rays_per_segment(), grid.seed()));
-  const std::vector<shading::FibreBcsdf> materials(database.materials.begin(),
-                                                   database.materials.end());
-  transport::TransferSettings settings;
-  settings.sh_order = database.sh_order;
-  settings.seed = core::derive_seed(description.seed(), kPurposeOfCheck);
-  settings.max_path_length = description.precompute().max_path_length();
-  const std::size_t count = std::min(kMostCells, cells);
+                         const std::vector<shading::FibreBcsdf>& materials,
+                         const SampleTracer& tracer) {
+  const TracedSample traced = tracer.trace(materials, kPlanOfCheck);
   Comparison comparison;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t cell = (2 * i + 1) * cells / (2 * count);
-    const transport::CellPaths paths{static_cast<std::uint32_t>(cell), &segments[cell], 0,
-                                     kPathsPerCell};
-    compare_cell(database, cell, transport::transfer_sums(scene, materials, paths, settings),
-                 comparison);
+  for (std::size_t i = 0; i < traced.cells.size(); ++i) {
+    compare_cell(database, traced.cells[i], traced.sums[i], comparison);
   }
-  return error_of(comparison, count);
+  return error_of(comparison, traced.cells.size());
 }
 
 }  // namespace weft::cli

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "proto/weft/v1/fabric.pb.h"
+#include "cli/sample_tracer.h"
 #include "storage/fabric_database.h"
 
 namespace weft::cli {
@@ -13,10 +13,10 @@ struct CarryError {
   std::size_t cells = 0;   // that were looked at
 };
 
-// Traces paths in the colours of `database` in some of its cells, evenly chosen, and compares.
-// Reads how the cloth was traced from its provenance. The same database gives the same numbers.
-// Throws core::Error(kDataLoss) when the provenance does not say it.
+// Compares the matrices of `database` with paths that `tracer` traces in its colours in some of its
+// cells, evenly chosen. The same database gives the same numbers.
 [[nodiscard]] CarryError check_carried(const storage::FabricDatabase& database,
-                                       const v1::FabricDescription& description);
+                                       const std::vector<shading::FibreBcsdf>& materials,
+                                       const SampleTracer& tracer);
 
 }  // namespace weft::cli

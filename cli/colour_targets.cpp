@@ -5,9 +5,8 @@
 #include <optional>
 #include <set>
 
-#include <fmt/format.h>
-
 #include "cli/colour_text.h"
+#include "core/check.h"
 #include "core/error.h"
 #include "core/mistakes.h"
 
@@ -55,6 +54,8 @@ std::set<std::size_t> yarns_named(const std::string& name, const FabricDatabase&
   return yarns;
 }
 
+}  // namespace
+
 std::map<std::size_t, glm::dvec3> requested_colours(const std::vector<std::string>& requests,
                                                     const FabricDatabase& db) {
   std::map<std::size_t, glm::dvec3> colours;
@@ -82,6 +83,8 @@ std::vector<std::set<std::size_t>> materials_of_yarns(const FabricDatabase& db) 
   return materials;
 }
 
+namespace {
+
 bool share(const std::set<std::size_t>& a, const std::set<std::size_t>& b) {
   return std::any_of(a.begin(), a.end(), [&](std::size_t m) { return b.contains(m); });
 }
@@ -92,11 +95,6 @@ std::vector<YarnTarget> colour_targets(const std::vector<std::string>& requests,
                                        const FabricDatabase& db) {
   std::map<std::size_t, glm::dvec3> colours = requested_colours(requests, db);
   const std::vector<std::set<std::size_t>> materials = materials_of_yarns(db);
-  const auto same_fibres = [&](std::size_t a, std::size_t b) {
-    return fmt::format("yarns {} and {} are of one material, {}", core::in_quotes(db.yarn_names[a]),
-                       core::in_quotes(db.yarn_names[b]),
-                       core::in_quotes(db.material_names[*materials[a].begin()]));
-  };
   std::vector<YarnTarget> targets;
   while (!colours.empty()) {
     const auto [first, colour] = *colours.begin();
@@ -113,16 +111,7 @@ std::vector<YarnTarget> colour_targets(const std::vector<std::string>& requests,
           continue;
         }
         const auto asked = colours.find(yarn);
-        if (asked == colours.end()) {
-          refuse(same_fibres(first, yarn) +
-                 ": they take one colour; name both, or give them materials of their own in the "
-                 "description and make the fabric again");
-        }
-        if (asked->second != colour) {
-          refuse(same_fibres(first, yarn) +
-                 ": they cannot have two colours; give them materials of their own in the "
-                 "description and make the fabric again");
-        }
+        CHECK(asked != colours.end() && asked->second == colour);
         target.yarns.push_back(yarn);
         dyed.insert(materials[yarn].begin(), materials[yarn].end());
         has_grown = true;

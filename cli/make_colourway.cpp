@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -10,10 +11,13 @@
 #include <google/protobuf/util/json_util.h>
 
 #include "cli/carried_over.h"
-#include "coordinator/versions/carry_over.h"
+#include "cli/colour_text.h"
+#include "cli/order_levels.h"
+#include "cli/traced_difference.h"
 #include "core/check.h"
 #include "core/error.h"
 #include "shading/colour_space.h"
+#include "storage/light_tables.h"
 
 namespace weft::cli {
 
@@ -28,8 +32,21 @@ void set_rgb(v1::Rgb& rgb, const glm::vec3& colour) {
   rgb.set_b(five_digits(colour.z));
 }
 
+std::vector<glm::dvec3> no_correction(const ColourwayRequest& request) {
+  return std::vector<glm::dvec3>(request.targets.size(), glm::dvec3(1));
+}
+
+std::vector<shading::FibreBcsdf> bcsdfs_of(const std::vector<shading::FibreMaterial>& materials) {
+  return {materials.begin(), materials.end()};
+}
+
 // Three digits: an estimate has no more.
 double significant(double value) { return std::stod(fmt::format("{:.3g}", value)); }
+
+std::string lightness_text(glm::dvec3 linear) {
+  const glm::dvec3 lab = shading::lab_from_linear(linear);
+  return fmt::format("{} (L* {:.1f}, a* {:.1f}, b* {:.1f})", hex_text(linear), lab.x, lab.y, lab.z);
+}
 
 std::string base_name(const ColourwaySource& base) {
   return base.is_published ? base.reference
@@ -38,15 +55,23 @@ std::string base_name(const ColourwaySource& base) {
 
 }  // namespace
 
-double own_exposure(const storage::RecolourableDatabase& base, const SwatchResponse& response) {
+ColourwayModel::ColourwayModel(const ColourwaySource& from, unsigned thread_count)
+    : base(from),
+      threads(thread_count),
+      carrier(base.contents),
+      response(base.contents.database, carrier, threads),
+      tracer(base.contents.database, base.description, threads) {}
+
+double own_exposure(const ColourwayModel& model) {
   std::vector<shading::FibreMaterial> white;
-  for (const shading::FibreMaterial& material : base.database.materials) {
+  for (const shading::FibreMaterial& material : model.base.contents.database.materials) {
     white.push_back(dyed(material, dye_of(material), glm::dvec3(1)));
   }
+  const coordinator::OrderLevels levels =
+      traced_levels(model.carrier.sums(white), {}, bcsdfs_of(white), model.tracer);
   glm::dvec3 shown(0);
   double seen = 0;
-  for (const YarnColour& yarn :
-       response.colours(white, coordinator::carried_matrices(base, white).transfer)) {
+  for (const YarnColour& yarn : model.response.colours(white, model.carrier.sums(white, levels))) {
     shown += yarn.share * yarn.linear;
     seen += yarn.share;
   }
@@ -59,13 +84,12 @@ double own_exposure(const storage::RecolourableDatabase& base, const SwatchRespo
   return significant(seen / mean);
 }
 
-ColourFit fit_colourway(const ColourwayRequest& request, const SwatchResponse& response,
+ColourFit fit_colourway(const ColourwayModel& model, const ColourwayRequest& request,
+                        const coordinator::OrderLevels& levels,
                         const std::vector<glm::dvec3>& correction) {
   const auto measure = [&](const std::vector<shading::FibreMaterial>& dyed) {
     std::vector<glm::dvec3> shown = target_colours(
-        request.targets,
-        response.colours(dyed,
-                         coordinator::carried_matrices(request.base->contents, dyed).transfer));
+        request.targets, model.response.colours(dyed, model.carrier.sums(dyed, levels)));
     for (std::size_t t = 0; t < shown.size(); ++t) {
       shown[t] *= request.exposure * correction[t];
     }
@@ -75,11 +99,25 @@ ColourFit fit_colourway(const ColourwayRequest& request, const SwatchResponse& r
                      request.source->contents.database.materials, measure);
 }
 
-void measure_fit(const ColourwayRequest& request, const storage::FabricDatabase& database,
-                 ColourFit& fit, std::vector<glm::dvec3>& correction) {
+coordinator::OrderLevels levels_of_fit(const ColourwayModel& model,
+                                       const ColourwayRequest& request) {
+  constexpr int kTraces = 2;
+  coordinator::OrderLevels levels;
+  for (int i = 0; i < kTraces; ++i) {
+    const std::vector<shading::FibreMaterial> materials =
+        fit_colourway(model, request, levels, no_correction(request)).materials;
+    levels = traced_levels(model.carrier.sums(materials, levels), levels, bcsdfs_of(materials),
+                           model.tracer);
+  }
+  return levels;
+}
+
+void measure_fit(const ColourwayModel& model, const ColourwayRequest& request,
+                 const storage::FabricDatabase& database, ColourFit& fit,
+                 std::vector<glm::dvec3>& correction) {
   constexpr double kBlack = 1e-6;
   const std::vector<glm::dvec3> shown =
-      target_colours(request.targets, yarn_colours(database, request.exposure, request.threads));
+      target_colours(request.targets, yarn_colours(database, request.exposure, model.threads));
   for (std::size_t t = 0; t < shown.size(); ++t) {
     correction[t] *= glm::max(shown[t], kBlack) / glm::max(fit.reached[t], kBlack);
     fit.reached[t] = shown[t];
@@ -91,7 +129,7 @@ void measure_fit(const ColourwayRequest& request, const storage::FabricDatabase&
 v1::FabricDescription recolored_description(const ColourwayRequest& request, const ColourFit& fit) {
   v1::FabricDescription description = request.source->description;
   description.set_name(request.name);
-  const std::vector<std::string>& names = request.base->contents.database.material_names;
+  const std::vector<std::string>& names = request.source->contents.database.material_names;
   for (const YarnTarget& target : request.targets) {
     for (const std::size_t m : target.materials) {
       for (v1::Material& material : *description.mutable_materials()) {
@@ -105,26 +143,72 @@ v1::FabricDescription recolored_description(const ColourwayRequest& request, con
   return description;
 }
 
-storage::RecolourableDatabase carried_colourway(const ColourwayRequest& request,
-                                                const ColourFit& fit) {
-  storage::RecolourableDatabase colourway = request.base->contents;
-  coordinator::carry_over(colourway, fit.materials);
+namespace {
+
+storage::RecolourableDatabase carried_contents(const ColourwayModel& model,
+                                               const ColourwayRequest& request,
+                                               const ColourFit& fit,
+                                               const coordinator::CarriedSums& sums) {
+  storage::RecolourableDatabase colourway{model.base.contents.database, {}};
+  storage::FabricDatabase& database = colourway.database;
+  coordinator::CarriedMatrices carried = model.carrier.matrices(sums);
+  database.transfer = std::move(carried.transfer);
+  database.transfer_se = std::move(carried.transfer_se);
+  database.materials = fit.materials;
+  database.c_s = storage::scattering_tables(fit.materials, database.sh_order);
   google::protobuf::util::JsonPrintOptions options;
   options.preserve_proto_field_names = true;
   std::string json;
   CHECK(google::protobuf::util::MessageToJsonString(recolored_description(request, fit), &json,
                                                     options)
             .ok());
-  colourway.database.description_json = std::move(json);
+  database.description_json = std::move(json);
   return colourway;
 }
 
-CarryError state_origin(const ColourwayRequest& request, storage::RecolourableDatabase& colourway) {
-  const CarryError error = check_carried(colourway.database, request.base->description);
-  colourway.recolouring.carried_over_json = carried_over_json(
-      {base_name(*request.base), request.base->digest.hex(), significant(error.light),
-       significant(error.light_noise), significant(error.matrix)});
-  return error;
+}  // namespace
+
+void check_reached(const ColourwayRequest& request, const ColourFit& fit) {
+  for (std::size_t t = 0; t < request.targets.size() && !request.takes_nearest; ++t) {
+    if (fit.delta_e[t] >= kPromisedDeltaE) {
+      throw core::Error(
+          core::Code::kInvalidArgument,
+          fmt::format("yarn {} cannot show {} in this cloth: its fibres reflect from 0 to 1 of "
+                      "light, and the nearest they get is {}, Delta E 2000 {:.1f}; ask for that, "
+                      "take it with --nearest, or let more light on it with --exposure",
+                      request.targets[t].label, hex_text(request.targets[t].linear),
+                      lightness_text(fit.reached[t]), fit.delta_e[t]));
+    }
+  }
+}
+
+CarriedColourway carry_colourway(const ColourwayModel& model, const ColourwayRequest& request) {
+  constexpr double kGoodDeltaE = 0.3;
+  constexpr int kMostRounds = 8;
+  CarriedColourway made;
+  const coordinator::OrderLevels levels = levels_of_fit(model, request);
+  std::optional<TracedDifference> difference;
+  std::vector<glm::dvec3> correction = no_correction(request);
+  for (int round = 0; round < kMostRounds; ++round) {
+    made.fit = fit_colourway(model, request, levels, correction);
+    check_reached(request, made.fit);
+    const coordinator::CarriedSums sums = model.carrier.sums(made.fit.materials, levels);
+    made.contents = carried_contents(model, request, made.fit, sums);
+    if (!difference) {
+      difference.emplace(made.contents.database, sums, bcsdfs_of(made.fit.materials), model.tracer);
+    }
+    difference->mend(made.contents.database, sums);
+    measure_fit(model, request, made.contents.database, made.fit, correction);
+    if (made.fit.worst_delta_e() < kGoodDeltaE) {
+      break;
+    }
+  }
+  check_reached(request, made.fit);
+  made.error = check_carried(made.contents.database, bcsdfs_of(made.fit.materials), model.tracer);
+  made.contents.recolouring.carried_over_json = carried_over_json(
+      {base_name(model.base), model.base.digest.hex(), significant(made.error.light),
+       significant(made.error.light_noise), significant(made.error.matrix)});
+  return made;
 }
 
 }  // namespace weft::cli

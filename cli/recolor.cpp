@@ -23,6 +23,7 @@
 #include "cli/output_file.h"
 #include "cli/present.h"
 #include "cli/print_json.h"
+#include "cli/split_materials.h"
 #include "client/fetch_version.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -37,17 +38,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kPromisedDeltaE = 1;
-constexpr int kMostRounds = 3;
-
 constexpr const char* kHelp =
     "The same cloth in other colours.\n"
     "FABRIC is a database (.h5) or a published version (silk, silk@3). Geometry and visibility "
     "are\n"
-    "reused, and light is carried over from the paths that were traced, in seconds, into the file\n"
-    "that -o names. With --exact it is traced anew: of a file into -o, of a published version "
-    "into\n"
-    "a new version with the coordinator.\n"
+    "reused. With -o, light is carried over from the paths that were traced, in seconds, into "
+    "that\n"
+    "file. Of a published version without -o, or with --exact, it is traced anew: into a new\n"
+    "version with the coordinator, or, of a file, into -o.\n"
     "A YARN is the name of one, 'warp', 'weft' or 'all'. A COLOUR is #7a1f2b (sRGB),\n"
     "linear:0.195,0.014,0.024 or lab:27.2,38.1,17.5 (D65): what the yarn shows on average, where "
     "a\n"
@@ -55,8 +53,8 @@ constexpr const char* kHelp =
     "(docs/colourways.md).\n"
     "Examples:\n"
     "  weft recolor silk.h5 --yarn all=#7a1f2b -o claret.h5\n"
-    "  weft recolor shot@2 --yarn warp=#7a1f2b --yarn weft=lab:60,-20,-10 -o shot.h5\n"
-    "  weft recolor shot@2 --yarn warp=#7a1f2b --exact";
+    "  weft recolor shot@2 --yarn warp=#7a1f2b --yarn weft=lab:50,-15,-8 -o shot.h5\n"
+    "  weft recolor shot@2 --yarn warp=#7a1f2b";
 
 struct RecolorOptions {
   security::Endpoint coordinator;
@@ -81,26 +79,6 @@ struct Recolored {
   std::string digest;               // of the contents; empty in a dry run
 };
 
-std::string lightness_text(glm::dvec3 linear) {
-  const glm::dvec3 lab = shading::lab_from_linear(linear);
-  return fmt::format("{} (L* {:.1f}, a* {:.1f}, b* {:.1f})", hex_text(linear), lab.x, lab.y, lab.z);
-}
-
-void check_reached(const ColourwayRequest& request, const ColourFit& fit,
-                   const RecolorOptions& options) {
-  for (std::size_t t = 0; t < request.targets.size() && !options.takes_nearest; ++t) {
-    if (fit.delta_e[t] >= kPromisedDeltaE) {
-      throw core::Error(
-          core::Code::kInvalidArgument,
-          fmt::format("yarn {} cannot show {} in this cloth: its fibres reflect from 0 to 1 of "
-                      "light, and the nearest they get is {}, Delta E 2000 {:.1f}; ask for that, "
-                      "take it with --nearest, or let more light on it with --exposure",
-                      request.targets[t].label, hex_text(request.targets[t].linear),
-                      lightness_text(fit.reached[t]), fit.delta_e[t]));
-    }
-  }
-}
-
 v1::Job publish(const v1::FabricDescription& description, const std::string& comment,
                 Client& connection) {
   Interruption interruption(kFollowInterrupts);
@@ -122,7 +100,8 @@ v1::Job publish(const v1::FabricDescription& description, const std::string& com
 // Traces the description: by the coordinator where the source is published, else here, with every
 // shard kept until the end. Leaves the database at options.output, if that names a file, and
 // returns its name.
-std::filesystem::path trace(const RecolorOptions& options, const ColourwayRequest& request,
+std::filesystem::path trace(const RecolorOptions& options, const ColourwayModel& model,
+                            const ColourwayRequest& request,
                             const v1::FabricDescription& description, Recolored& made) {
   if (request.source->is_published) {
     Client connection(options.coordinator);
@@ -152,39 +131,33 @@ std::filesystem::path trace(const RecolorOptions& options, const ColourwayReques
       [&](const std::vector<StageProgress>& stages) { printer.update(stages); },
       [&] { return interrupt.requested(); }};
   const LocalRunResult result =
-      run_locally(description, request.threads, cache, options.output, hooks);
+      run_locally(description, model.threads, cache, options.output, hooks);
   printer.finish(result.stages);
   made.digest = result.content_digest.hex();
   return options.output;
 }
 
-std::vector<glm::dvec3> no_correction(const ColourwayRequest& request) {
-  return std::vector<glm::dvec3>(request.targets.size(), glm::dvec3(1));
-}
-
-// Whether what was measured is as good as promised, or the best that is wanted.
-bool is_good(const ColourFit& fit, double delta_e, const RecolorOptions& options, int round) {
-  return fit.worst_delta_e() < delta_e || options.takes_nearest || round + 1 == kMostRounds;
-}
-
 // Traces the new colours, measures them, and mends the dyes as far as carried-over light was wrong.
-Recolored make_exactly(const RecolorOptions& options, const ColourwayRequest& request,
-                       const SwatchResponse& response) {
+Recolored make_exactly(const RecolorOptions& options, const ColourwayModel& model,
+                       const ColourwayRequest& request) {
+  constexpr int kMostRounds = 3;
   Recolored made;
-  std::vector<glm::dvec3> correction = no_correction(request);
+  const coordinator::OrderLevels levels = levels_of_fit(model, request);
+  std::vector<glm::dvec3> correction(request.targets.size(), glm::dvec3(1));
   for (int round = 0;; ++round) {
-    made.fit = fit_colourway(request, response, correction);
-    check_reached(request, made.fit, options);
+    made.fit = fit_colourway(model, request, levels, correction);
+    check_reached(request, made.fit);
     if (options.is_dry_run) {
       return made;
     }
     const std::filesystem::path path =
-        trace(options, request, recolored_description(request, made.fit), made);
-    measure_fit(request,
+        trace(options, model, request, recolored_description(request, made.fit), made);
+    measure_fit(model, request,
                 storage::read_database(
                     path.empty() ? resolve_fabric(made.version, options.coordinator) : path),
                 made.fit, correction);
-    if (is_good(made.fit, kPromisedDeltaE, options, round)) {
+    const bool is_met = made.fit.worst_delta_e() < kPromisedDeltaE;
+    if (is_met || options.takes_nearest || round + 1 == kMostRounds) {
       break;
     }
     fmt::print(stderr, "traced, the colours are Delta E 2000 {:.2f} off; again\n",
@@ -194,30 +167,20 @@ Recolored make_exactly(const RecolorOptions& options, const ColourwayRequest& re
     std::error_code ignored;  // the database is written; a folder left over does no harm
     std::filesystem::remove_all(options.output + ".weft", ignored);
   }
-  check_reached(request, made.fit, options);
+  check_reached(request, made.fit);
   return made;
 }
 
-Recolored make_carried(const RecolorOptions& options, const ColourwayRequest& request,
-                       const SwatchResponse& response) {
-  constexpr double kGoodDeltaE = 0.3;
+Recolored make_carried(const RecolorOptions& options, const ColourwayModel& model,
+                       const ColourwayRequest& request) {
+  CarriedColourway carried = carry_colourway(model, request);
   Recolored made;
-  storage::RecolourableDatabase colourway;
-  std::vector<glm::dvec3> correction = no_correction(request);
-  for (int round = 0;; ++round) {
-    made.fit = fit_colourway(request, response, correction);
-    check_reached(request, made.fit, options);
-    colourway = carried_colourway(request, made.fit);
-    measure_fit(request, colourway.database, made.fit, correction);
-    if (is_good(made.fit, kGoodDeltaE, options, round)) {
-      break;
-    }
-  }
-  check_reached(request, made.fit, options);
-  made.error = state_origin(request, colourway);
+  made.fit = std::move(carried.fit);
+  made.error = carried.error;
   if (!options.is_dry_run) {
-    made.digest =
-        storage::write_database(colourway.database, colourway.recolouring, options.output).hex();
+    made.digest = storage::write_database(carried.contents.database, carried.contents.recolouring,
+                                          options.output)
+                      .hex();
   }
   return made;
 }
@@ -229,9 +192,9 @@ Json colour_json(glm::dvec3 linear) {
           {"lab", {lab.x, lab.y, lab.z}}};
 }
 
-Json to_json(const Recolored& made, const ColourwayRequest& request, const RecolorOptions& options,
-             double seconds) {
-  const std::vector<std::string>& names = request.base->contents.database.material_names;
+Json to_json(const Recolored& made, const ColourwayRequest& request, const std::string& base,
+             const RecolorOptions& options, double seconds) {
+  const std::vector<std::string>& names = request.source->contents.database.material_names;
   Json targets = Json::array();
   for (std::size_t t = 0; t < request.targets.size(); ++t) {
     const YarnTarget& target = request.targets[t];
@@ -269,7 +232,7 @@ Json to_json(const Recolored& made, const ColourwayRequest& request, const Recol
     json["content_digest"] = made.digest;
   }
   if (made.error) {
-    json["carried_over"] = {{"from", request.base->reference},
+    json["carried_over"] = {{"from", base},
                             {"light_error", made.error->light},
                             {"light_error_noise", made.error->light_noise},
                             {"matrix_error", made.error->matrix},
@@ -278,7 +241,7 @@ Json to_json(const Recolored& made, const ColourwayRequest& request, const Recol
   return json;
 }
 
-void print_text(const Recolored& made, const ColourwayRequest& request,
+void print_text(const Recolored& made, const ColourwayRequest& request, const std::string& base,
                 const RecolorOptions& options, double seconds) {
   fmt::print("measured where a white diffuser shows {:.3g}\n", request.exposure);
   for (std::size_t t = 0; t < request.targets.size(); ++t) {
@@ -288,7 +251,7 @@ void print_text(const Recolored& made, const ColourwayRequest& request,
   }
   if (made.error) {
     fmt::print("light carried over from {}: off by {:.1f} % (+- {:.1f} %), matrices by {:.1f} %\n",
-               request.base->reference, 100 * made.error->light, 100 * made.error->light_noise,
+               base, 100 * made.error->light, 100 * made.error->light_noise,
                100 * made.error->matrix);
   }
   const std::string what = options.is_dry_run       ? "nothing was written"
@@ -310,28 +273,45 @@ void run(RecolorOptions options) {
     check_output_file(options.output);
   }
   const core::Stopwatch since_start;
-  const ColourwaySource source = open_colourway_source(options.fabric, options.coordinator);
-  const bool is_published_anew = source.is_published && options.is_exact;
-  if (options.output.empty() && !is_published_anew && !options.is_dry_run) {
-    throw CLI::RequiredError("--output");
+  ColourwaySource source = open_colourway_source(options.fabric, options.coordinator);
+  if (options.output.empty() && !options.is_dry_run) {
+    if (!source.is_published) {
+      throw CLI::RequiredError("--output");
+    }
+    if (!options.is_exact) {
+      fmt::print(
+          stderr,
+          "the light is traced for a new version; -o FILE.h5 has it carried over in seconds, "
+          "for a file\n");
+      options.is_exact = true;
+    }
   }
-  const std::optional<ColourwaySource> base = base_of(source, options.coordinator);
+  const unsigned threads =
+      options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  std::optional<ColourwaySource> base = base_of(source, options.coordinator);
+  const std::vector<MaterialSplit> splits =
+      material_splits(options.yarns, source.contents.database);
+  if (base) {
+    std::vector<MaterialSplit> all =
+        splits_between(base->contents.database, source.contents.database);
+    all.insert(all.end(), splits.begin(), splits.end());
+    split_materials(all, *base, threads);
+  }
+  split_materials(splits, source, threads);
   ColourwayRequest request;
   request.source = &source;
-  request.base = base ? &*base : &source;
   request.targets = colour_targets(options.yarns, source.contents.database);
   request.name = options.name.empty() ? source.description.name() : options.name;
-  request.threads =
-      options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
-  const SwatchResponse response(request.base->contents.database, request.threads);
-  request.exposure =
-      options.exposure > 0 ? options.exposure : own_exposure(request.base->contents, response);
-  const Recolored made = options.is_exact ? make_exactly(options, request, response)
-                                          : make_carried(options, request, response);
+  request.takes_nearest = options.takes_nearest;
+  const ColourwayModel model(base ? *base : source, threads);
+  request.exposure = options.exposure > 0 ? options.exposure : own_exposure(model);
+  const Recolored made = options.is_exact ? make_exactly(options, model, request)
+                                          : make_carried(options, model, request);
+  const double seconds = since_start.seconds();
   if (options.wants_json) {
-    print_json(to_json(made, request, options, since_start.seconds()));
+    print_json(to_json(made, request, model.base.reference, options, seconds));
   } else {
-    print_text(made, request, options, since_start.seconds());
+    print_text(made, request, model.base.reference, options, seconds);
   }
 }
 
