@@ -7,6 +7,7 @@
 #include <new>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include <libdeflate.h>
 
@@ -91,6 +92,60 @@ FilteredChunk filtered(std::span<const std::byte> data, std::size_t chunk_bytes,
   return chunk;
 }
 
+// The chunks of one dataset while threads share them out.
+class Chunks {
+ public:
+  Chunks(std::span<const std::byte> data, std::size_t chunk_bytes, std::size_t element_bytes,
+         bool compress)
+      : data_(data),
+        chunk_bytes_(chunk_bytes),
+        element_bytes_(element_bytes),
+        compress_(compress),
+        chunks_((data.size() + chunk_bytes - 1) / chunk_bytes) {}
+
+  [[nodiscard]] std::size_t count() const { return chunks_.size(); }
+
+  // What one thread does of them.
+  void work() noexcept {
+    try {
+      std::unique_ptr<libdeflate_compressor, Freed> compressor;
+      if (compress_) {
+        compressor.reset(libdeflate_alloc_compressor(kDeflateLevel));
+        if (!compressor) {
+          throw std::bad_alloc();
+        }
+      }
+      for (std::size_t i = next_++; i < chunks_.size(); i = next_++) {
+        const std::size_t first = i * chunk_bytes_;
+        const auto held = data_.subspan(first, std::min(chunk_bytes_, data_.size() - first));
+        chunks_[i] = filtered(held, chunk_bytes_, element_bytes_, compressor.get());
+      }
+    } catch (...) {
+      if (!has_failed_.test_and_set()) {
+        failure_ = std::current_exception();
+      }
+    }
+  }
+
+  // REQUIRES: all threads are done.
+  [[nodiscard]] std::vector<FilteredChunk> take() {
+    if (failure_) {
+      std::rethrow_exception(failure_);
+    }
+    return std::move(chunks_);
+  }
+
+ private:
+  std::span<const std::byte> data_;
+  std::size_t chunk_bytes_;
+  std::size_t element_bytes_;
+  bool compress_;
+  std::vector<FilteredChunk> chunks_;
+  std::atomic<std::size_t> next_{0};
+  std::atomic_flag has_failed_;
+  std::exception_ptr failure_;
+};
+
 }  // namespace
 
 std::vector<FilteredChunk> filtered_chunks(std::span<const std::byte> data, std::size_t chunk_bytes,
@@ -98,42 +153,16 @@ std::vector<FilteredChunk> filtered_chunks(std::span<const std::byte> data, std:
   CHECK(chunk_bytes > 0 && element_bytes > 0);
   CHECK_EQ(chunk_bytes % element_bytes, 0U);
   CHECK_EQ(data.size() % element_bytes, 0U);
-  std::vector<FilteredChunk> chunks((data.size() + chunk_bytes - 1) / chunk_bytes);
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::atomic_flag has_failed;
-  const auto work = [&] {
-    try {
-      std::unique_ptr<libdeflate_compressor, Freed> compressor;
-      if (compress) {
-        compressor.reset(libdeflate_alloc_compressor(kDeflateLevel));
-        if (!compressor) {
-          throw std::bad_alloc();
-        }
-      }
-      for (std::size_t i = next++; i < chunks.size(); i = next++) {
-        const std::size_t first = i * chunk_bytes;
-        chunks[i] = filtered(data.subspan(first, std::min(chunk_bytes, data.size() - first)),
-                             chunk_bytes, element_bytes, compressor.get());
-      }
-    } catch (...) {
-      if (!has_failed.test_and_set()) {
-        failure = std::current_exception();
-      }
-    }
-  };
+  Chunks chunks(data, chunk_bytes, element_bytes, compress);
   {
     std::vector<std::jthread> helpers;
     const std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
-    for (std::size_t i = 1; i < std::min(threads, chunks.size()); ++i) {
-      helpers.emplace_back(work);
+    for (std::size_t i = 1; i < std::min(threads, chunks.count()); ++i) {
+      helpers.emplace_back([&chunks] { chunks.work(); });
     }
-    work();
+    chunks.work();
   }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
-  return chunks;
+  return chunks.take();
 }
 
 }  // namespace weft::storage::h5

@@ -114,7 +114,7 @@ class CoverMask {
     const std::int32_t n = resolution_;
     for (std::int32_t band = 0; band < bands_; ++band) {
       const __m128i rows = rows_of(region, band);
-      const Rows* open = &open_[static_cast<std::size_t>(band * n)];
+      const Rows* open = open_.data() + static_cast<std::ptrdiff_t>(band) * n;
       if (is_open_between(open, std::max(first, 0), std::min(last, n - 1), rows) ||
           (first < 0 && is_open_between(open, first + n, std::min(last + n, n - 1), rows)) ||
           (last >= n && is_open_between(open, std::max(first - n, 0), last - n, rows))) {

@@ -114,10 +114,11 @@ std::vector<float> SgRegions::weights(std::span<const std::uint8_t> bits,
 
 double open_share(std::span<const std::uint8_t> bits, std::uint32_t resolution) {
   CHECK_EQ(bits.size(), std::size_t{resolution} * resolution / 8);
+  const std::size_t row_bytes = resolution / 8;
   double sum = 0;
   for (std::uint32_t row = 0; row < resolution; ++row) {
     int visible = 0;
-    for (const std::uint8_t byte : bits.subspan(row * (resolution / 8), resolution / 8)) {
+    for (const std::uint8_t byte : bits.subspan(row * row_bytes, row_bytes)) {
       visible += std::popcount(byte);
     }
     sum += visible * pixel_solid_angle(row, resolution);
