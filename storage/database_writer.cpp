@@ -44,11 +44,12 @@ std::vector<std::uint16_t> halves_of(const std::vector<float>& values) {
 }
 
 double rounding_rms(const std::vector<float>& values) {
-  std::vector<float> differences(values.size());
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    differences[i] = core::float_from_half(core::half_from_float(values[i])) - values[i];
+  double sum = 0;
+  for (const float value : values) {
+    const float difference = core::float_from_half(core::half_from_float(value)) - value;
+    sum += static_cast<double>(difference) * static_cast<double>(difference);
   }
-  return root_mean_square(differences);
+  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
 }
 
 Extents extents_of(const FabricDatabase& db) {
