@@ -382,7 +382,7 @@ def main():
     parser.add_argument("--keep", type=pathlib.Path)
     parser.add_argument("--say", action="store_true")
     parser.add_argument("--full", action="store_true")
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     names = arguments.pages or pages_of(arguments.source)
     if arguments.check:
         mistakes = check(arguments.source, names)
