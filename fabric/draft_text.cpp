@@ -32,15 +32,6 @@ std::string plain_text(std::string_view text, bool& was_utf16) {
   return result;
 }
 
-std::string shown(std::string_view text) {
-  constexpr std::size_t kMost = 40;
-  std::string result = "\"";
-  for (const char c : text.substr(0, kMost)) {
-    result += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
-  }
-  return result + (text.size() > kMost ? "...\"" : "\"");
-}
-
 std::string number_of(std::size_t count, const std::string& thing) {
   return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
 }

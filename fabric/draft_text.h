@@ -31,9 +31,6 @@ void for_each_line(std::string_view text, const Visit& visit) {
   }
 }
 
-// A value as it may be repeated in a message: short and printable.
-[[nodiscard]] std::string shown(std::string_view text);
-
 // All of the text as a number; nothing when it is none.
 template <class T>
 [[nodiscard]] std::optional<T> parsed(std::string_view text) {

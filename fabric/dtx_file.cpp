@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/mistakes.h"
 #include "fabric/draft_text.h"
 #include "fabric/wif_file.h"
 
@@ -91,8 +92,8 @@ void DtxFile::read_line(std::string_view line, std::uint32_t number) {
     return;
   }
   if (sections_.empty()) {
-    fail(number,
-         shown(line) + " stands before the first section; a DTX file begins with @@StartDTX");
+    fail(number, core::in_quotes(line) +
+                     " stands before the first section; a DTX file begins with @@StartDTX");
   }
   DtxSection& section = sections_.back();
   if (line.starts_with("%%") && !is_free_text(key_of(section.name))) {
@@ -139,8 +140,8 @@ std::vector<DtxItem> DtxFile::items(const DtxSection& section, std::uint32_t lim
     const auto number = parsed<std::uint32_t>(word.text);
     if (!number || *number > limit) {
       fail(section, word.line,
-           "has " + shown(word.text) + "; a whole number from 0 to " + std::to_string(limit) +
-               " is needed");
+           "has " + core::in_quotes(word.text) + "; a whole number from 0 to " +
+               std::to_string(limit) + " is needed");
     }
     if (!goes_on) {
       items.push_back({{}, word.line});
@@ -171,7 +172,8 @@ std::vector<std::vector<std::uint32_t>> DtxFile::bits(const DtxSection& section,
     for (std::uint32_t column = 0; column < width; ++column) {
       const char mark = line.text[column];
       if (mark != '0' && mark != '1') {
-        fail(section, line.line, "has the row " + shown(line.text) + "; write 0 and 1 only");
+        fail(section, line.line,
+             "has the row " + core::in_quotes(line.text) + "; write 0 and 1 only");
       }
       if (mark == '1') {
         row.push_back(column + 1);
@@ -190,7 +192,7 @@ std::uint32_t DtxFile::stated(const std::string& key, std::uint32_t limit) const
   const auto number = parsed<std::uint32_t>(mark.text);
   if (!number || *number > limit) {
     fail(*info, mark.line,
-         "states %%" + key + " " + shown(mark.text) + "; a whole number from 0 to " +
+         "states %%" + key + " " + core::in_quotes(mark.text) + "; a whole number from 0 to " +
              std::to_string(limit) + " is needed");
   }
   return *number;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/mistakes.h"
 #include "fabric/draft_text.h"
 
 namespace weft::fabric {
@@ -126,7 +127,8 @@ void WifFile::fail(std::uint32_t line, const std::string& what) const {
 void WifFile::open_section(std::string_view line, std::uint32_t number) {
   const std::size_t close = line.find(']');
   if (close == std::string_view::npos) {
-    fail(number, "the section name " + shown(line) + " has no closing bracket; write [NAME]");
+    fail(number,
+         "the section name " + core::in_quotes(line) + " has no closing bracket; write [NAME]");
   }
   std::string name = normalized(line.substr(1, close - 1));
   if (name.empty()) {
@@ -157,7 +159,8 @@ void WifFile::read_line(std::string_view line, std::uint32_t number) {
   }
   const std::size_t equals = line.find('=');
   if (sections_.empty()) {
-    fail(number, shown(line) + " stands before the first [SECTION]; a WIF file begins with [WIF]");
+    fail(number, core::in_quotes(line) +
+                     " stands before the first [SECTION]; a WIF file begins with [WIF]");
   }
   WifSection& section = sections_[current_];
   if (equals == std::string_view::npos) {
@@ -216,7 +219,8 @@ bool WifFile::boolean(const WifSection& section, const WifEntry& entry, bool oth
       return false;
     }
   }
-  fail(section, entry.line, entry.key + " is " + shown(entry.value) + "; write true or false");
+  fail(section, entry.line,
+       entry.key + " is " + core::in_quotes(entry.value) + "; write true or false");
 }
 
 double WifFile::number(const WifSection& section, const WifEntry& entry) const {
@@ -225,7 +229,7 @@ double WifFile::number(const WifSection& section, const WifEntry& entry) const {
   const std::optional<double> value = parsed<double>(text);
   if (!value || !std::isfinite(*value)) {
     fail(section, entry.line,
-         entry.key + " is " + shown(entry.value) + "; a number is needed, such as 0.212");
+         entry.key + " is " + core::in_quotes(entry.value) + "; a number is needed, such as 0.212");
   }
   return *value;
 }
@@ -244,7 +248,7 @@ std::vector<std::uint32_t> WifFile::whole_numbers(const WifSection& section, con
     const std::optional<std::int64_t> value = parsed<std::int64_t>(item);
     if (!value || *value < 0 || *value > limit) {
       fail(section, entry.line,
-           entry.key + "=" + shown(entry.value) + ": " + shown(item) +
+           entry.key + "=" + core::in_quotes(entry.value) + ": " + core::in_quotes(item) +
                " is not a whole number from 0 to " + std::to_string(limit));
     }
     numbers.push_back(static_cast<std::uint32_t>(*value));
@@ -257,19 +261,20 @@ std::uint32_t WifFile::whole_number(const WifSection& section, const WifEntry& e
   const std::vector<std::uint32_t> numbers = whole_numbers(section, entry, limit);
   if (numbers.size() != 1) {
     fail(section, entry.line,
-         entry.key + " is " + shown(entry.value) + "; one whole number is needed");
+         entry.key + " is " + core::in_quotes(entry.value) + "; one whole number is needed");
   }
   return numbers.front();
 }
 
 std::uint32_t WifFile::key_number(const WifSection& section, const WifEntry& entry) const {
   if (entry.key.empty()) {
-    fail(section, entry.line, shown(entry.value) + " has no '='; write number=value");
+    fail(section, entry.line, core::in_quotes(entry.value) + " has no '='; write number=value");
   }
   const std::optional<std::uint32_t> value = parsed<std::uint32_t>(entry.key);
   if (!value || *value > kMaxKey) {
     fail(section, entry.line,
-         shown(entry.key) + " is no number; the keys of this section are numbers from 1 on");
+         core::in_quotes(entry.key) +
+             " is no number; the keys of this section are numbers from 1 on");
   }
   return *value;
 }
