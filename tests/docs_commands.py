@@ -3,7 +3,8 @@
 
     docs_commands.py SOURCE_DIR BIN_DIR [PAGE...]     runs pages, such as docs/slurm.md; default: all
     docs_commands.py SOURCE_DIR --check               reads all pages: blocks say what they are, files are there
-    docs_commands.py SOURCE_DIR --print PAGE SCRIPT   prints what SCRIPT is to run of a page
+    docs_commands.py SOURCE_DIR --print PAGE SCRIPT   prints what SCRIPT is to run of a page; with
+    --where WHERE                                     only what it is to run there
     --keep FOLDER                                     keeps what PAGE wrote in FOLDER/PAGE
     --say                                             also shows the commands and what they print
     --full                                            pictures as the pages show them
@@ -344,12 +345,12 @@ def check(source, names):
     return mistakes
 
 
-def print_blocks(source, name, script):
+def print_blocks(source, name, script, where):
     blocks, mistakes = docs_blocks.read_page(name, (source / name).read_text())
-    for block in blocks:
-        if block.by == script:
-            print(f"# {block.place}\n{block.text}")
-    return mistakes
+    found = [block for block in blocks if block.by == script and where in ("", block.where)]
+    for block in found:
+        print(f"# {block.place}\n{block.text}")
+    return mistakes or ([] if found else [f"{name}: {script} has nothing to run there"])
 
 
 def run_pages(arguments, names):
@@ -379,6 +380,7 @@ def main():
     parser.add_argument("pages", nargs="*")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--print", nargs=2, metavar=("PAGE", "SCRIPT"))
+    parser.add_argument("--where", default="")
     parser.add_argument("--keep", type=pathlib.Path)
     parser.add_argument("--say", action="store_true")
     parser.add_argument("--full", action="store_true")
@@ -387,7 +389,7 @@ def main():
     if arguments.check:
         mistakes = check(arguments.source, names)
     elif arguments.print:
-        mistakes = print_blocks(arguments.source, *arguments.print)
+        mistakes = print_blocks(arguments.source, *arguments.print, arguments.where)
     elif arguments.bin:
         mistakes = run_pages(arguments, names)
     else:
