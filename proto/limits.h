@@ -9,6 +9,7 @@ namespace weft::v1 {
 
 inline constexpr int kMessageLimitBytes = 64 << 20;
 inline constexpr std::size_t kChunkLimitBytes = std::size_t{1} << 20;
+inline constexpr std::size_t kBatchLimitBytes = std::size_t{4} << 20;
 inline constexpr std::uint64_t kBlobLimitBytes = std::uint64_t{1} << 30;
 inline constexpr int kCompletionLimit = 1024;
 inline constexpr std::uint32_t kFreeAttemptsLimit = 64;

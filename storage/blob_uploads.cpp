@@ -58,6 +58,7 @@ std::unique_ptr<BlobUpload> BlobUploads::begin(const core::Digest& digest, std::
                                                           std::to_string(committed_bytes(digest)) +
                                                           ", not at " + std::to_string(offset));
     }
+    core::make_folder(folder_);  // somebody may have wiped the blobs
     return std::make_unique<BlobUpload>(*this, digest, size_bytes, offset);
   } catch (...) {
     end(digest);

@@ -63,6 +63,25 @@ class Blobs : public ServiceTest {
     return status;
   }
 
+  grpc::Status send_together(const std::vector<std::string>& all) {
+    grpc::ClientContext context;
+    v1::WriteManyResponse response;
+    return blobs_->WriteMany(&context, request_of(all), &response);
+  }
+  static v1::WriteManyRequest request_of(const std::vector<std::string>& all) {
+    v1::WriteManyRequest request;
+    for (const std::string& data : all) {
+      v1::WholeBlob& blob = *request.add_blobs();
+      blob.set_digest(core::digest_of(data).binary());
+      blob.set_data(data);
+    }
+    return request;
+  }
+  std::string stored(const std::string& data) {
+    std::string read_back;
+    return read(core::digest_of(data), 0, &read_back).ok() ? read_back : "absent";
+  }
+
   const std::string data_ = [] {
     std::string data(1'000'000, '\0');
     for (std::size_t i = 0; i < data.size(); ++i) {
@@ -148,6 +167,45 @@ TEST_F(Blobs, UploadOnTopOfDamagedBytes_IsToldSoAndBeginsAgain) {
   EXPECT_EQ(query().committed_bytes(), 0U);
   EXPECT_TRUE(send_when_free(0, data_.size()).ok());
   EXPECT_TRUE(query().complete());
+}
+
+TEST_F(Blobs, SmallOnesAreStoredTogether) {
+  ASSERT_TRUE(send_together({"one", "", data_, "one"}).ok());
+  ASSERT_TRUE(send_together({"one", "two"}).ok()) << "one of them is there already";
+  EXPECT_EQ(stored("one"), "one");
+  EXPECT_EQ(stored(""), "");
+  EXPECT_EQ(stored("two"), "two");
+  EXPECT_EQ(stored(data_), data_);
+  EXPECT_TRUE(send_together({}).ok());
+}
+
+TEST_F(Blobs, OfSmallOnesTogetherNoneIsStoredWhenOneIsDamaged) {
+  v1::WriteManyRequest request = request_of({"one", "two"});
+  request.mutable_blobs(1)->set_data("twO");
+  grpc::ClientContext context;
+  v1::WriteManyResponse response;
+  const grpc::Status status = blobs_->WriteMany(&context, request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DATA_LOSS) << status.error_message();
+  EXPECT_EQ(stored("one"), "absent");
+}
+
+TEST_F(Blobs, TooMuchTogetherIsRefused) {
+  const std::string large(v1::kChunkLimitBytes + 1, 'x');
+  EXPECT_EQ(send_together({"one", large}).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  const std::vector<std::string> many(5, large.substr(1));
+  EXPECT_EQ(send_together(many).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(stored("one"), "absent");
+}
+
+TEST_F(Blobs, DiskThatTakesNothingOfManyIsAShortResource) {
+  const std::filesystem::path in_the_way =
+      folder_ / "state" / "blobs" / core::digest_of("one").hex().substr(0, 2);
+  core::write_file_atomically(in_the_way, "no folder");
+  const grpc::Status status = send_together({"one", "two"});
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+  std::filesystem::remove(in_the_way);
+  EXPECT_TRUE(send_together({"one", "two"}).ok());
+  EXPECT_EQ(stored("one"), "one");
 }
 
 }  // namespace

@@ -61,6 +61,18 @@ class OneUpload final : public v1::BlobService::Service {
     return grpc::Status::OK;
   }
 
+  grpc::Status WriteMany(grpc::ServerContext* /*context*/, const v1::WriteManyRequest* request,
+                         v1::WriteManyResponse* /*response*/) override {
+    const std::lock_guard lock(mutex_);
+    if (calls_++ == 0 && breaks_off_behind > 0) {
+      return {breaks_off_with, "the power went"};
+    }
+    for (const v1::WholeBlob& blob : request->blobs()) {
+      stored_ += blob.data();
+    }
+    return grpc::Status::OK;
+  }
+
   grpc::Status Write(grpc::ServerContext* /*context*/, grpc::ServerReader<v1::WriteRequest>* reader,
                      v1::WriteResponse* /*response*/) override {
     const std::lock_guard lock(mutex_);
@@ -91,6 +103,7 @@ class OneUpload final : public v1::BlobService::Service {
   std::string kept_;
   std::string stored_;
   std::vector<std::uint64_t> offsets_;
+  int calls_ = 0;  // of WriteMany
   std::unique_ptr<grpc::Server> server_;
   std::shared_ptr<grpc::Channel> channel_;
 };
@@ -108,7 +121,7 @@ bool goes_on() { return false; }
 TEST(BlobClient, BrokenUploadGoesOnWhereItWas) {
   OneUpload coordinator;
   coordinator.breaks_off_behind = 2 * kMiB;
-  BlobClient(coordinator.channel()).write(core::digest_of(kData), kData, goes_on);
+  BlobClient(coordinator.channel()).write({{core::digest_of(kData), kData}}, goes_on);
   EXPECT_EQ(coordinator.stored(), kData);
   EXPECT_EQ(coordinator.offsets(), (std::vector<std::uint64_t>{0, 2 * kMiB}));
 }
@@ -118,9 +131,29 @@ TEST(BlobClient, CancelledUploadGoesOnWhereItWas) {
   OneUpload coordinator;
   coordinator.breaks_off_behind = 2 * kMiB;
   coordinator.breaks_off_with = grpc::StatusCode::CANCELLED;
-  BlobClient(coordinator.channel()).write(core::digest_of(kData), kData, goes_on);
+  BlobClient(coordinator.channel()).write({{core::digest_of(kData), kData}}, goes_on);
   EXPECT_EQ(coordinator.stored(), kData);
   EXPECT_EQ(coordinator.offsets(), (std::vector<std::uint64_t>{0, 2 * kMiB}));
+}
+
+TEST(BlobClient, SmallOnesGoTogetherAndAgainWhenTheCallBreaksOff) {
+  OneUpload coordinator;
+  coordinator.breaks_off_behind = 1;
+  BlobClient(coordinator.channel())
+      .write({{core::digest_of("one"), "one"}, {core::digest_of("two"), "two"}}, goes_on);
+  EXPECT_EQ(coordinator.stored(), "onetwo");
+}
+
+TEST(BlobClient, SmallOnesThatThereIsNoRoomForAreAnError) {
+  OneUpload coordinator;
+  coordinator.breaks_off_behind = 1;
+  coordinator.breaks_off_with = grpc::StatusCode::RESOURCE_EXHAUSTED;
+  try {
+    BlobClient(coordinator.channel()).write({{core::digest_of("one"), "one"}}, goes_on);
+    FAIL() << "no error";
+  } catch (const core::Error& error) {
+    EXPECT_EQ(error.code(), core::Code::kResourceExhausted);
+  }
 }
 
 TEST(BlobClient, ClosedClientUploadsNothing) {
@@ -128,7 +161,7 @@ TEST(BlobClient, ClosedClientUploadsNothing) {
   BlobClient client(coordinator.channel());
   client.close();
   try {
-    client.write(core::digest_of(kData), kData, goes_on);
+    client.write({{core::digest_of(kData), kData}}, goes_on);
     FAIL() << "no error";
   } catch (const core::Error& error) {
     EXPECT_EQ(error.code(), core::Code::kCancelled);
@@ -140,7 +173,7 @@ TEST(BlobClient, UploadBeginsAgainWhenWhatWasKeptIsDamaged) {
   OneUpload coordinator;
   coordinator.breaks_off_behind = 2 * kMiB;
   coordinator.damages_what_came = true;
-  BlobClient(coordinator.channel()).write(core::digest_of(kData), kData, goes_on);
+  BlobClient(coordinator.channel()).write({{core::digest_of(kData), kData}}, goes_on);
   EXPECT_EQ(coordinator.stored(), kData);
   EXPECT_EQ(coordinator.offsets(), (std::vector<std::uint64_t>{0, 2 * kMiB, 0}));
 }
@@ -148,7 +181,7 @@ TEST(BlobClient, UploadBeginsAgainWhenWhatWasKeptIsDamaged) {
 TEST(BlobClient, WrongBytesFromTheBeginningAreAnError) {
   OneUpload coordinator;
   try {
-    BlobClient(coordinator.channel()).write(core::digest_of("something else"), kData, goes_on);
+    BlobClient(coordinator.channel()).write({{core::digest_of("something else"), kData}}, goes_on);
     FAIL() << "no error";
   } catch (const core::Error& error) {
     EXPECT_EQ(error.code(), core::Code::kDataLoss);

@@ -136,6 +136,19 @@ class FakeCoordinator : public v1::WorkerService::Service, public v1::BlobServic
     return grpc::Status::OK;
   }
 
+  grpc::Status WriteMany(grpc::ServerContext* /*context*/, const v1::WriteManyRequest* request,
+                         v1::WriteManyResponse* /*response*/) override {
+    const std::lock_guard lock(mutex_);
+    if (refusal_ != grpc::StatusCode::OK) {
+      return {refusal_, "not now"};
+    }
+    for (const v1::WholeBlob& blob : request->blobs()) {
+      blobs_[blob.digest()] = blob.data();
+    }
+    changed_.notify_all();
+    return grpc::Status::OK;
+  }
+
   grpc::Status Write(grpc::ServerContext* /*context*/, grpc::ServerReader<v1::WriteRequest>* reader,
                      v1::WriteResponse* /*response*/) override {
     v1::WriteRequest request;

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "proto/limits.h"
 #include "worker/spool.h"
 
 namespace weft::worker {
@@ -67,19 +68,30 @@ TEST_F(SpoolTest, GivesResultsInTheOrderTheyCameAndKeepsTheirNamesUntilForgotten
   Spool spool(root_, "w1", 1000);
   ASSERT_TRUE(put(spool, claim_of(7, 3), "three"));
   ASSERT_TRUE(put(spool, claim_of(7, 4), "four"));
-  const auto first = spool.next();
-  ASSERT_TRUE(first);
-  EXPECT_EQ(first->claim.shard, 3U);
-  EXPECT_EQ(Spool::read(*first), "three");
-  spool.uploaded(*first);
+  const std::vector<SpoolItem> both = spool.next();
+  ASSERT_EQ(both.size(), 2U);
+  EXPECT_EQ(both[0].claim.shard, 3U);
+  EXPECT_EQ(Spool::read(both[0]), "three");
+  spool.uploaded(both[0]);
   EXPECT_EQ(count(core::digest_of("three").hex()), 0U) << "the coordinator has the bytes";
   EXPECT_EQ(count(".attempt"), 1U);
-  const auto second = spool.next();
-  ASSERT_TRUE(second);
-  EXPECT_EQ(Spool::read(*second), "four");
-  spool.uploaded(*second);
-  spool.forget(first->claim.attempt->assignment.name());
+  EXPECT_EQ(Spool::read(both[1]), "four");
+  spool.uploaded(both[1]);
+  spool.forget(both[0].claim.attempt->assignment.name());
   EXPECT_EQ(count(".attempt"), 0U);
+}
+
+TEST_F(SpoolTest, ResultsThatAreTooLargeToGoTogetherGoOneAfterTheOther) {
+  Spool spool(root_, "w1", 1 << 24);
+  const std::size_t most = v1::kChunkLimitBytes;
+  for (const std::size_t size : {most / 2, most / 2, std::size_t{1}, 3 * most, std::size_t{1}}) {
+    ASSERT_TRUE(put(spool, claim_of(1, size), std::string(size, 'x')));
+  }
+  std::vector<std::size_t> sizes;
+  while (sizes.size() < 4) {
+    sizes.push_back(spool.next().size());
+  }
+  EXPECT_EQ(sizes, (std::vector<std::size_t>{2, 1, 1, 1}));
 }
 
 TEST_F(SpoolTest, WhatADeadProcessLeftIsTakenOverWithItsTokenAndItsResults) {
@@ -111,7 +123,7 @@ TEST_F(SpoolTest, WhatADeadProcessLeftIsTakenOverWithItsTokenAndItsResults) {
   SpoolItem item = orphans[0].items[0];
   item.claim = claim_of(9, 6);
   spool.enter(item);
-  spool.uploaded(*spool.next());
+  spool.uploaded(spool.next().at(0));
   spool.forget(item.claim.attempt->assignment.name());
   EXPECT_FALSE(fs::exists(root_ / "dead"));
 }
@@ -152,12 +164,11 @@ TEST_F(SpoolTest, ATornEndOfAnAttemptsFileIsLeftOut) {
 TEST_F(SpoolTest, ADamagedResultIsNotRead) {
   Spool spool(root_, "w1", 1000);
   ASSERT_TRUE(put(spool, claim_of(1, 0), "good bytes"));
-  const auto item = spool.next();
-  ASSERT_TRUE(item);
-  const fs::path file = item->folder->path() / ("1.0." + core::digest_of("good bytes").hex());
+  const SpoolItem item = spool.next().at(0);
+  const fs::path file = item.folder->path() / ("1.0." + core::digest_of("good bytes").hex());
   std::ofstream(file) << "good byteZ";
-  EXPECT_THROW((void)Spool::read(*item), core::Error);
-  spool.dropped(*item);
+  EXPECT_THROW((void)Spool::read(item), core::Error);
+  spool.dropped(item);
   EXPECT_FALSE(fs::exists(file));
 }
 
@@ -172,9 +183,9 @@ TEST_F(SpoolTest, AFullOneMakesTheNextWaitUntilThereIsRoomOrItIsToStop) {
   });
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_FALSE(is_in.load()) << "it went in although the spool was full";
-  spool.uploaded(*spool.next());
+  spool.uploaded(spool.next().at(0));
   second.join();
-  EXPECT_EQ(Spool::read(*spool.next()), "z");
+  EXPECT_EQ(Spool::read(spool.next().at(0)), "z");
 }
 
 TEST_F(SpoolTest, AClosedOneKeepsItsResultsForASuccessor) {
@@ -183,7 +194,7 @@ TEST_F(SpoolTest, AClosedOneKeepsItsResultsForASuccessor) {
     ASSERT_TRUE(put(spool, claim_of(1, 0), "a"));
     spool.close();
     EXPECT_FALSE(put(spool, claim_of(1, 1), "b"));
-    EXPECT_FALSE(spool.next());
+    EXPECT_TRUE(spool.next().empty());
   }
   const std::vector<SpoolFolder::Content> content = content_of(root_);
   ASSERT_EQ(content.size(), 1U);
@@ -196,7 +207,7 @@ TEST_F(SpoolTest, AnEmptyOneLeavesNothingBehind) {
     Spool spool(root_, "w1", 1000);
     const ShardClaim claim = claim_of(1, 0);
     ASSERT_TRUE(put(spool, claim, "a"));
-    spool.uploaded(*spool.next());
+    spool.uploaded(spool.next().at(0));
     spool.forget(claim.attempt->assignment.name());
   }
   EXPECT_TRUE(fs::is_empty(root_));
@@ -225,7 +236,7 @@ TEST_F(SpoolTest, AFullDiskIsAShortResourceAndLeavesNoHalfResult) {
   EXPECT_NE(message.find("--scratch"), std::string::npos) << message;
   EXPECT_EQ(count("1.1."), 0U);
   EXPECT_TRUE(put(spool, claim_of(1, 1), std::string(10'000, 'x'))) << "there is room again";
-  EXPECT_EQ(Spool::read(*spool.next()), "small");
+  EXPECT_EQ(Spool::read(spool.next().at(0)), "small");
 }
 
 TEST_F(SpoolTest, RemainsOfAFolderThatWasBeingRemovedAreRemoved) {

@@ -145,8 +145,46 @@ grpc::Status BlobClient::send(const core::Digest& digest, std::string_view data,
   return writer->Finish();
 }
 
-void BlobClient::write(const core::Digest& digest, std::string_view data,
-                       const std::function<bool()>& should_stop) {
+void BlobClient::write(const std::vector<Blob>& blobs, const std::function<bool()>& should_stop) {
+  if (blobs.size() == 1 && blobs.front().data.size() > v1::kChunkLimitBytes) {
+    write_in_chunks(blobs.front(), should_stop);
+  } else {
+    write_together(blobs, should_stop);
+  }
+}
+
+void BlobClient::throw_if_stopped(const std::function<bool()>& should_stop) {
+  if (should_stop() || is_closed()) {
+    throw core::Error(core::Code::kCancelled, "stopped while writing a blob");
+  }
+}
+
+void BlobClient::write_together(const std::vector<Blob>& blobs,
+                                const std::function<bool()>& should_stop) {
+  v1::WriteManyRequest request;
+  for (const Blob& blob : blobs) {
+    v1::WholeBlob& whole = *request.add_blobs();
+    whole.set_digest(blob.digest.binary());
+    whole.set_data(blob.data);
+  }
+  BackOff back_off;
+  while (true) {
+    Call call(*this, request.ByteSizeLong());
+    v1::WriteManyResponse response;
+    const grpc::Status status = stub_->WriteMany(&call.context(), request, &response);
+    if (status.ok()) {
+      return;
+    }
+    throw_if_stopped(should_stop);
+    if (!is_away(status)) {
+      v1::throw_unless_ok(status, "write " + std::to_string(blobs.size()) + " blobs");
+    }
+    back_off.wait(should_stop);
+  }
+}
+
+void BlobClient::write_in_chunks(const Blob& blob, const std::function<bool()>& should_stop) {
+  const auto& [digest, data] = blob;
   BackOff back_off;
   std::uint64_t offset = 0;
   while (true) {
@@ -154,9 +192,7 @@ void BlobClient::write(const core::Digest& digest, std::string_view data,
     if (status.ok()) {
       return;
     }
-    if (should_stop() || is_closed()) {
-      throw core::Error(core::Code::kCancelled, "stopped while writing a blob");
-    }
+    throw_if_stopped(should_stop);
     // Somebody else uploads it, the coordinator has kept less of it than it said, or what it kept
     // was damaged, and is dropped.
     const bool is_elsewhere = status.error_code() == grpc::StatusCode::ABORTED ||

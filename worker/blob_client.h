@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
@@ -28,11 +29,15 @@ class BlobClient {
   [[nodiscard]] std::string read(const core::Digest& digest,
                                  const std::function<bool()>& should_stop);
 
-  // Stores the blob with the coordinator; goes on where a broken upload ended, or begins again when
-  // what is there of it is damaged. Throws
-  // core::Error(kResourceExhausted) when it is too large or the coordinator's disk is full.
-  void write(const core::Digest& digest, std::string_view data,
-             const std::function<bool()>& should_stop);
+  struct Blob {
+    core::Digest digest;
+    std::string data;
+  };
+  // Stores blobs with the coordinator: in one call those that may go together (see cluster.proto,
+  // WriteMany), or a single one of any size, which goes on where a broken upload ended, or begins
+  // again when what is there of it is damaged. Throws core::Error(kResourceExhausted) when it is
+  // too large or the coordinator's disk is full.
+  void write(const std::vector<Blob>& blobs, const std::function<bool()>& should_stop);
 
   // Breaks off the calls that run, for a process that ends.
   void close();
@@ -41,6 +46,9 @@ class BlobClient {
   class Call;
 
   [[nodiscard]] bool is_closed();
+  void write_together(const std::vector<Blob>& blobs, const std::function<bool()>& should_stop);
+  void write_in_chunks(const Blob& blob, const std::function<bool()>& should_stop);
+  void throw_if_stopped(const std::function<bool()>& should_stop);
   [[nodiscard]] std::optional<std::uint64_t> committed(const core::Digest& digest);
   [[nodiscard]] grpc::Status send(const core::Digest& digest, std::string_view data,
                                   std::uint64_t offset);

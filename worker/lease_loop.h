@@ -17,6 +17,7 @@
 
 #include "core/clock.h"
 #include "core/digest.h"
+#include "core/error.h"
 #include "proto/weft/v1/cluster.grpc.pb.h"
 #include "worker/attempt_table.h"
 #include "worker/baker.h"
@@ -98,8 +99,11 @@ class LeaseLoop {
   void give_up(const ShardClaim& claim);
   void fail(const ShardClaim& claim, v1::ErrorKind kind, const std::string& message);
   void upload();
-  void upload(const SpoolItem& item);
-  void deliver(const SpoolItem& item);
+  void upload(std::vector<SpoolItem> items);
+  [[nodiscard]] std::vector<BlobClient::Blob> read_spooled(std::vector<SpoolItem>& items);
+  void deliver(const std::vector<BlobClient::Blob>& blobs);
+  void drop(const SpoolItem& item, const core::Error& why);
+  void note_uploaded(const SpoolItem& item);
   void set_undelivered(const std::string& why);
 
   // housekeeping (lease_loop_house.cpp)

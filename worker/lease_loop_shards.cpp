@@ -48,6 +48,7 @@ std::optional<ShardClaim> LeaseLoop::next_claim(Seat& seat) {
   {
     std::unique_lock lock(mutex_);
     while (!is_leaving_.load() && !(claim = table_.claim())) {
+      spool_.hurry();
       changed_.wait(lock);
     }
     if (!claim) {
@@ -189,25 +190,43 @@ void LeaseLoop::fail(const ShardClaim& claim, v1::ErrorKind kind, const std::str
 }
 
 void LeaseLoop::upload() {
-  while (const std::optional<SpoolItem> item = spool_.next()) {
-    upload(*item);
+  while (true) {
+    std::vector<SpoolItem> items = spool_.next();
+    if (items.empty()) {
+      return;
+    }
+    upload(std::move(items));
   }
 }
 
-// Gives a result to the coordinator. One that it has no room for has cost time: it stays in the
+// Those whose bytes are as they were computed; the others have failed.
+std::vector<BlobClient::Blob> LeaseLoop::read_spooled(std::vector<SpoolItem>& items) {
+  std::vector<BlobClient::Blob> blobs;
+  std::erase_if(items, [&](const SpoolItem& item) {
+    try {
+      blobs.push_back({item.result.digest, Spool::read(item)});
+      return false;
+    } catch (const core::Error& error) {
+      drop(item, error);
+      return true;
+    }
+  });
+  return blobs;
+}
+
+// Gives results to the coordinator. Those that it has no room for have cost time: they stay in the
 // scratch folder until there is room, and nothing more is asked for meanwhile.
-void LeaseLoop::deliver(const SpoolItem& item) {
+void LeaseLoop::deliver(const std::vector<BlobClient::Blob>& blobs) {
   const auto should_stop = [this] { return is_giving_up_.load(); };
-  const std::string bytes = Spool::read(item);
   BackOff back_off(kLongestUndelivered);
   while (true) {
     try {
-      blobs_.write(item.result.digest, bytes, should_stop);
+      blobs_.write(blobs, should_stop);
       set_undelivered("");
       return;
     } catch (const core::Error& error) {
       const bool has_no_room = error.code() == core::Code::kResourceExhausted;
-      if (!has_no_room || bytes.size() > v1::kBlobLimitBytes) {
+      if (!has_no_room || blobs.front().data.size() > v1::kBlobLimitBytes) {
         throw;
       }
       set_undelivered(error.what());
@@ -234,18 +253,34 @@ void LeaseLoop::set_undelivered(const std::string& why) {
   tell_news();
 }
 
-void LeaseLoop::upload(const SpoolItem& item) {
+void LeaseLoop::drop(const SpoolItem& item, const core::Error& why) {
+  spool_.dropped(item);
+  fail(item.claim, v1::ERROR_KIND_RESOURCE_SHORT, why.what());
+}
+
+void LeaseLoop::upload(std::vector<SpoolItem> items) {
+  const std::vector<BlobClient::Blob> blobs = read_spooled(items);
+  if (blobs.empty()) {
+    return;
+  }
   try {
-    deliver(item);
+    deliver(blobs);
   } catch (const core::Error& error) {
-    if (error.code() == core::Code::kCancelled) {
-      spool_.kept(item);
-    } else {
-      spool_.dropped(item);
-      fail(item.claim, v1::ERROR_KIND_RESOURCE_SHORT, error.what());
+    for (const SpoolItem& item : items) {
+      if (error.code() == core::Code::kCancelled) {
+        spool_.kept(item);
+      } else {
+        drop(item, error);
+      }
     }
     return;
   }
+  for (const SpoolItem& item : items) {
+    note_uploaded(item);
+  }
+}
+
+void LeaseLoop::note_uploaded(const SpoolItem& item) {
   spool_.uploaded(item);
   v1::ShardResult result;
   result.set_shard(item.claim.shard);

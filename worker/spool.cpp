@@ -6,12 +6,15 @@
 #include <spdlog/spdlog.h>
 
 #include "core/error.h"
+#include "proto/limits.h"
 
 namespace weft::worker {
 
 namespace {
 
 constexpr std::chrono::milliseconds kPoll{100};
+constexpr std::chrono::milliseconds kGatherFor{250};
+constexpr std::size_t kMuch = 64;  // results
 
 v1::Completion name_of(const v1::Assignment& assignment) {
   v1::Completion name;
@@ -85,15 +88,31 @@ bool Spool::put(const ShardClaim& claim, const core::Digest& digest, const std::
   return true;
 }
 
-std::optional<SpoolItem> Spool::next() {
+std::vector<SpoolItem> Spool::next() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return is_closed_ || !items_.empty(); });
-  if (is_closed_) {
-    return std::nullopt;
+  changed_.wait_for(lock, kGatherFor, [&] {
+    return is_closed_ || is_urgent_ || items_.size() >= kMuch ||
+           total_bytes_ >= std::min<std::uint64_t>(limit_bytes_, v1::kChunkLimitBytes);
+  });
+  is_urgent_ = false;
+  std::vector<SpoolItem> batch;
+  std::uint64_t bytes = 0;
+  while (!is_closed_ && !items_.empty()) {
+    bytes += items_.front().result.size_bytes;
+    if (!batch.empty() && bytes > v1::kChunkLimitBytes) {
+      break;
+    }
+    batch.push_back(std::move(items_.front()));
+    items_.pop_front();
   }
-  SpoolItem item = std::move(items_.front());
-  items_.pop_front();
-  return item;
+  return batch;
+}
+
+void Spool::hurry() {
+  const std::lock_guard lock(mutex_);
+  is_urgent_ = !items_.empty();
+  changed_.notify_all();
 }
 
 std::string Spool::read(const SpoolItem& item) {

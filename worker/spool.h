@@ -49,9 +49,13 @@ class Spool {
   bool put(const ShardClaim& claim, const core::Digest& digest, const std::string& bytes,
            const std::function<bool()>& should_stop);
 
-  // The oldest result to upload, until one is there; nothing once closed. Exactly one of the three
-  // ends must follow.
-  [[nodiscard]] std::optional<SpoolItem> next();
+  // The oldest results to upload, once one is there: those that may go in one call (see
+  // cluster.proto, WriteMany), or a larger one alone. What comes within a quarter of a second goes
+  // along, unless it is much or hurry() was called. Nothing once closed. For each, exactly one of
+  // the three ends must follow.
+  [[nodiscard]] std::vector<SpoolItem> next();
+  // Nothing more will come soon.
+  void hurry();
   // Its bytes. Throws core::Error(kDataLoss) when they were damaged.
   [[nodiscard]] static std::string read(const SpoolItem& item);
 
@@ -101,6 +105,7 @@ class Spool {
   std::deque<SpoolItem> items_;
   std::vector<SpoolItem> unsynced_;
   std::uint64_t total_bytes_ = 0;
+  bool is_urgent_ = false;  // what waits is not to wait for more
   std::uint64_t next_number_ = 1;
   bool is_closed_ = false;
 };

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <spdlog/spdlog.h>
 
@@ -90,22 +91,59 @@ grpc::Status BlobService::Write(grpc::ServerContext* context,
     if (!reader->Read(&request)) {
       return {grpc::StatusCode::INVALID_ARGUMENT, "the stream has no message"};
     }
-    try {
-      return store(request, *reader);
-    } catch (const core::Error& error) {
-      // What the disk does not take is a short resource to the worker, which would try for ever
-      // after UNAVAILABLE. When the coordinator ends, the worker keeps it for the next one.
-      const bool is_disk = error.code() == core::Code::kUnavailable ||
-                           error.code() == core::Code::kResourceExhausted;
-      if (!is_disk) {
-        throw;
-      }
-      spdlog::warn("event=blob_not_stored message=\"{}\"", error.what());
-      const bool is_ending = scheduler_.fatal_problem().has_value();
-      throw core::Error(is_ending ? core::Code::kUnavailable : core::Code::kResourceExhausted,
-                        std::string("the coordinator cannot store a blob: ") + error.what());
-    }
+    return stored([&] { return store(request, *reader); });
   });
+}
+
+grpc::Status BlobService::WriteMany(grpc::ServerContext* context,
+                                    const v1::WriteManyRequest* request,
+                                    v1::WriteManyResponse* /*response*/) {
+  return answer(*context, "BlobService.WriteMany", [&]() -> grpc::Status {
+    const OpenStreams::Ticket ticket = writes_.enter(*context);
+    std::vector<core::Digest> digests;
+    std::size_t bytes = 0;
+    for (const v1::WholeBlob& blob : request->blobs()) {
+      digests.push_back(digest_from(blob.digest(), "digest"));
+      bytes += blob.data().size();
+      if (blob.data().size() > v1::kChunkLimitBytes || bytes > v1::kBatchLimitBytes) {
+        return {grpc::StatusCode::INVALID_ARGUMENT,
+                "blobs of over 1 MiB, or over 4 MiB together, go to Write"};
+      }
+    }
+    for (int i = 0; i < request->blobs_size(); ++i) {
+      if (core::digest_of(request->blobs(i).data()) != digests[static_cast<std::size_t>(i)]) {
+        return {grpc::StatusCode::DATA_LOSS, "the bytes are not those of blob " +
+                                                 digests[static_cast<std::size_t>(i)].hex() +
+                                                 "; nothing was stored"};
+      }
+    }
+    return stored([&] {
+      storage::BlobStore::Batch batch(scheduler_.blobs());
+      for (int i = 0; i < request->blobs_size(); ++i) {
+        batch.put(digests[static_cast<std::size_t>(i)], request->blobs(i).data());
+      }
+      batch.commit();
+      return grpc::Status::OK;
+    });
+  });
+}
+
+grpc::Status BlobService::stored(const std::function<grpc::Status()>& store) const {
+  try {
+    return store();
+  } catch (const core::Error& error) {
+    // What the disk does not take is a short resource to the worker, which would try for ever
+    // after UNAVAILABLE. When the coordinator ends, the worker keeps it for the next one.
+    const bool is_disk =
+        error.code() == core::Code::kUnavailable || error.code() == core::Code::kResourceExhausted;
+    if (!is_disk) {
+      throw;
+    }
+    spdlog::warn("event=blob_not_stored message=\"{}\"", error.what());
+    const bool is_ending = scheduler_.fatal_problem().has_value();
+    throw core::Error(is_ending ? core::Code::kUnavailable : core::Code::kResourceExhausted,
+                      std::string("the coordinator cannot store a blob: ") + error.what());
+  }
 }
 
 grpc::Status BlobService::store(v1::WriteRequest& request,
@@ -118,16 +156,6 @@ grpc::Status BlobService::store(v1::WriteRequest& request,
   }
   // One of another size is damaged, and is replaced.
   if (scheduler_.blobs().use(digest) == request.size_bytes()) {
-    return grpc::Status::OK;
-  }
-  // Most results come in one message, and need no file for what has come.
-  if (request.offset() == 0 && request.data().size() == request.size_bytes() &&
-      request.data().size() <= v1::kChunkLimitBytes) {
-    if (core::digest_of(request.data()) != digest) {
-      return {grpc::StatusCode::DATA_LOSS,
-              "the bytes are not those of blob " + digest.hex() + "; nothing was stored"};
-    }
-    scheduler_.blobs().put(digest, request.data());
     return grpc::Status::OK;
   }
   return receive(digest, request, reader);

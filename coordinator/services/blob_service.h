@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 
 #include "coordinator/scheduler/scheduler.h"
 #include "coordinator/services/open_streams.h"
@@ -11,8 +12,8 @@
 
 namespace weft::coordinator {
 
-// Results and inputs by digest. A call holds one chunk of its blob in memory. Contracts:
-// cluster.proto.
+// Results and inputs by digest. A call holds one chunk of its blob in memory, or
+// small blobs whole. Contracts: cluster.proto.
 class BlobService final : public v1::BlobService::Service {
  public:
   explicit BlobService(Scheduler& scheduler);
@@ -22,8 +23,12 @@ class BlobService final : public v1::BlobService::Service {
                           v1::QueryWriteResponse* response) override;
   grpc::Status Write(grpc::ServerContext* context, grpc::ServerReader<v1::WriteRequest>* reader,
                      v1::WriteResponse* response) override;
+  grpc::Status WriteMany(grpc::ServerContext* context, const v1::WriteManyRequest* request,
+                         v1::WriteManyResponse* response) override;
 
  private:
+  // What `store` answers, or why the disk does not take it.
+  [[nodiscard]] grpc::Status stored(const std::function<grpc::Status()>& store) const;
   grpc::Status store(v1::WriteRequest& request, grpc::ServerReader<v1::WriteRequest>& reader);
   grpc::Status receive(const core::Digest& digest, v1::WriteRequest& request,
                        grpc::ServerReader<v1::WriteRequest>& reader);
