@@ -35,6 +35,10 @@ void list_devices(bool wants_json) {
                info.driver, info.name});
   }
   fmt::print("{}", table.text());
+  if (devices.front().kind == gpu::DeviceInfo::Kind::kSoftware) {
+    fmt::print(stderr,
+               "no GPU: unless --device names one of these, the CPU draws, which is faster\n");
+  }
 }
 
 }  // namespace weft::cli

@@ -186,12 +186,12 @@ MachineCheck check_devices() {
     const std::string found =
         fmt::format("{} ({}), {}", first.name, render::gpu::kind_name(first.kind), first.driver);
     if (first.kind == render::gpu::DeviceInfo::Kind::kSoftware) {
-      return {name, State::kNote, found + "; no GPU",
+      return {name, State::kNote, found + "; no GPU: the CPU draws",
               "with a GPU, install its Vulkan driver; without one this is right"};
     }
     return {name, State::kGood, found, ""};
   } catch (const std::exception& error) {
-    return {name, State::kWarning, error.what(), "until then, draw with --device cpu"};
+    return {name, State::kWarning, error.what(), "until then, the CPU draws"};
   }
 }
 

@@ -7,11 +7,8 @@ namespace weft::cli {
 
 std::unique_ptr<render::gpu::DeviceRenderer> open_render_device(const std::string& wanted,
                                                                 const v1::Scene& scene) {
-  if (wanted == "cpu") {
-    return nullptr;
-  }
   if (!render::draws_on_device(scene.integration())) {
-    if (wanted != "auto") {
+    if (wanted != "auto" && wanted != "cpu") {
       throw core::Error(
           core::Code::kInvalidArgument,
           "--device " + wanted +
@@ -22,7 +19,7 @@ std::unique_ptr<render::gpu::DeviceRenderer> open_render_device(const std::strin
     return nullptr;
   }
   try {
-    return std::make_unique<render::gpu::DeviceRenderer>(wanted);
+    return render::gpu::open_renderer(wanted);
   } catch (const core::Error& error) {
     if (error.code() != core::Code::kFailedPrecondition) {
       throw;

@@ -178,7 +178,7 @@ void add_drawing_options(CLI::App& command, RenderOptions& options) {
                    "Precomputed integrator: shade Gaussian lights by the paper's choices");
   command
       .add_option("--device", options.device,
-                  "What draws the precomputed integrator: auto (a GPU, else the software device), "
+                  "What draws the precomputed integrator: auto (a GPU, else the CPU), "
                   "cpu, or an index or name of --list-devices")
       ->capture_default_str();
   command

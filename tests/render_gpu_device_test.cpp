@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "render/gpu/device.h"
+#include "render/gpu/device_renderer.h"
 #include "render/gpu/kernels.h"
 #include "render/gpu/spirv.h"
 #include "render/gpu/vulkan_failure.h"
@@ -274,6 +275,16 @@ TEST(DeviceFailures, SayWhatWasWrongAndHowToMendIt) {
   EXPECT_THAT(failure(kDeviceLost).what(), HasSubstr("drawing: the device was lost"));
   EXPECT_THAT(failure(kLayerNotPresent).what(), HasSubstr("install vulkan-validationlayers"));
   EXPECT_THAT(failure(kIncompatibleDriver).what(), HasSubstr("mesa-vulkan-drivers"));
+}
+
+TEST(OpenRenderer, LeavesTheDrawingToTheProcessorWhereThereIsNoGpu) {
+  EXPECT_EQ(open_renderer("cpu"), nullptr);
+  const std::vector<DeviceInfo> devices = list_devices();
+  const bool has_gpu = devices.front().kind != DeviceInfo::Kind::kSoftware;
+  EXPECT_EQ(open_renderer("auto") != nullptr, has_gpu);
+  const std::unique_ptr<DeviceRenderer> named = open_renderer("0");
+  ASSERT_NE(named, nullptr);
+  EXPECT_EQ(named->info().name, devices.front().name);
 }
 
 }  // namespace

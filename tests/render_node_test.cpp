@@ -40,12 +40,12 @@ TEST_F(NodeTest, DrawsWhatIsDrawnInProcessBitByBit) {
 }
 
 TEST_F(NodeTest, DrawsOnItsDeviceWhatTheDeviceDrawsInProcess) {
-  options_.device = "auto";
+  options_.device = "0";
   start();
   KeptPictures there;
   draw(small_scene("one@1"), false, there);
   draw(small_scene("one@1"), true, there);
-  gpu::DeviceRenderer device("auto");
+  gpu::DeviceRenderer device("0");
   EXPECT_EQ(client().node().device(), device.info().name);
   KeptPictures here;
   draw_here(small_scene("one@1"), 0.5f, false, here, &device);

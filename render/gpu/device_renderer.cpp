@@ -10,6 +10,17 @@
 namespace weft::render::gpu {
 namespace {
 
+bool has_gpu() {
+  try {
+    return list_devices().front().kind != DeviceInfo::Kind::kSoftware;
+  } catch (const core::Error& error) {
+    if (error.code() != core::Code::kFailedPrecondition) {
+      throw;
+    }
+    return false;  // there is no driver at all
+  }
+}
+
 std::string mebibytes(std::uint64_t bytes) {
   return std::to_string((bytes + (std::uint64_t{1} << 20) - 1) >> 20) + " MiB";
 }
@@ -71,6 +82,13 @@ std::vector<const DeviceFabricTables*> DeviceRenderer::tables_of(
     tables.push_back(kept_.at(fabric).tables.get());
   }
   return tables;
+}
+
+std::unique_ptr<DeviceRenderer> open_renderer(const std::string& wanted) {
+  if (wanted == "cpu" || (wanted == "auto" && !has_gpu())) {
+    return nullptr;
+  }
+  return std::make_unique<DeviceRenderer>(wanted);
 }
 
 }  // namespace weft::render::gpu

@@ -59,4 +59,9 @@ class DeviceRenderer {
   std::map<const Fabric*, Kept> kept_;
 };
 
+// What `--device` means: nothing for "cpu", and for "auto" where there is no GPU, because the CPU
+// draws one and a half to two and a half times as fast as the software device
+// (docs/performance.md); else the device of that index or name. Throws as DeviceRenderer.
+[[nodiscard]] std::unique_ptr<DeviceRenderer> open_renderer(const std::string& wanted);
+
 }  // namespace weft::render::gpu

@@ -88,7 +88,7 @@ void add_options(CLI::App& app, Options& options) {
       ->check(CLI::Range(1U, 64U))
       ->capture_default_str();
   app.add_option("--device", options.node.device,
-                 "what draws the precomputed integrator: auto (a GPU, else the software device), "
+                 "what draws the precomputed integrator: auto (a GPU, else the CPU), "
                  "cpu, or an index or name of 'weft render --list-devices'")
       ->capture_default_str();
   app.add_option("--threads", options.node.threads, "threads; default: all the machine has")

@@ -15,6 +15,7 @@
 #include "render/draw_pictures.h"
 #include "render/make_integrator.h"
 #include "render/node/attachments.h"
+#include "render/node/dear_question.h"
 #include "render/node/drawing_message.h"
 #include "render/node/io_guard.h"
 #include "render/node/outbox.h"
@@ -36,7 +37,10 @@ std::uint64_t picture_bytes(const v1::Scene& scene) {
 class RenderService::Conversation : public PictureSink {
  public:
   Conversation(grpc::ServerContext& context, Stream& stream)
-      : context_(context), stream_(stream), guard_([&context] { context.TryCancel(); }) {}
+      : context_(context),
+        stream_(stream),
+        is_cancelled_([&context] { return context.IsCancelled(); }),
+        guard_([&context] { context.TryCancel(); }) {}
   ~Conversation() override { finish_writing(); }
   Conversation(const Conversation&) = delete;
   Conversation& operator=(const Conversation&) = delete;
@@ -56,6 +60,8 @@ class RenderService::Conversation : public PictureSink {
       writer_.join();
     }
   }
+  // Asked at every pixel.
+  [[nodiscard]] bool seems_cancelled() { return is_cancelled_(); }
   [[nodiscard]] bool cancelled() const { return context_.IsCancelled(); }
   [[nodiscard]] Outbox& outbox() { return outbox_; }
   std::map<std::string, LoadedFabric>& fabrics() { return fabrics_; }
@@ -116,6 +122,7 @@ class RenderService::Conversation : public PictureSink {
   grpc::ServerContext& context_;
   Stream& stream_;
   Outbox outbox_;
+  DearQuestion is_cancelled_;
   std::map<std::string, LoadedFabric> fabrics_;  // of the order, by reference
   IoGuard guard_;
   std::thread writer_;
@@ -127,15 +134,15 @@ RenderService::RenderService(const RenderNodeOptions& options)
       fabrics_(options.coordinator,
                client::FabricCache(options.cache / "fabrics", options.cache_limit_bytes),
                options.memory_limit_bytes) {
-  if (options.device != "cpu") {
-    device_ = std::make_unique<gpu::DeviceRenderer>(options.device);
+  device_ = gpu::open_renderer(options.device);
+  if (device_) {
     device_name_ = device_->info().name;
   }
 }
 
 void RenderService::draw(const v1::RenderOrder& order, Conversation& conversation) {
   const v1::Scene& scene = order.scene();
-  const auto should_stop = [&] { return aborted_ || conversation.cancelled(); };
+  const auto should_stop = [&] { return aborted_ || conversation.seems_cancelled(); };
   const RenderQueue::Place place = queue_.enter(order.request_id());
   conversation.start_writing();
   place.wait(

@@ -20,14 +20,14 @@ struct RenderNodeOptions {
   std::uint64_t cache_limit_bytes = std::uint64_t{16} << 30;
   std::uint64_t memory_limit_bytes = std::uint64_t{4} << 30;
   std::uint32_t orders_limit = 8;  // being drawn and waiting
-  std::string device = "auto";     // as DeviceRenderer takes it; "cpu": none
+  std::string device = "auto";     // as gpu::open_renderer takes it
   unsigned threads = 0;            // 0: as many as the machine has
 };
 
 // RenderService as render.proto has it. Any thread may call.
 class RenderService final : public v1::RenderService::Service {
  public:
-  // Opens the device. Throws what gpu::DeviceRenderer throws.
+  // Opens the device. Throws what gpu::open_renderer throws.
   explicit RenderService(const RenderNodeOptions& options);
 
   grpc::Status Render(
