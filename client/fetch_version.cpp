@@ -66,14 +66,21 @@ void fetch_stream(Coordinator& coordinator, const v1::Version& version, PartFile
   outcome.bytes_fetched = version.size_bytes() - outcome.bytes_kept;
 }
 
-bool is_this_version(const std::filesystem::path& path, const v1::Version& version) {
+// What came is read whole before it gets its name; a file that has it was, and its digest says that
+// it is the same.
+enum class Checked { kBytes, kContents };
+
+bool is_this_version(const std::filesystem::path& path, const v1::Version& version,
+                     Checked checked) {
   std::error_code failure;
   if (!std::filesystem::is_regular_file(path, failure) ||
       std::filesystem::file_size(path, failure) != version.size_bytes()) {
     return false;
   }
   try {
-    return storage::verify_database(path) == version_digest(version);
+    const core::Digest digest = checked == Checked::kContents ? storage::verify_database(path)
+                                                              : storage::checked_digest(path);
+    return digest == version_digest(version);
   } catch (const core::Error& error) {
     if (error.code() != core::Code::kDataLoss && error.code() != core::Code::kNotFound) {
       throw;  // it could not be checked: that says nothing about the file
@@ -117,7 +124,7 @@ FetchOutcome fetch_version(Coordinator& coordinator, const v1::Version& version,
                            PieceIndex here) {
   const core::Digest digest = version_digest(version);
   FetchOutcome outcome;
-  if (is_this_version(path, version)) {
+  if (is_this_version(path, version, Checked::kBytes)) {
     outcome.was_there = true;
     return outcome;
   }
@@ -131,7 +138,7 @@ FetchOutcome fetch_version(Coordinator& coordinator, const v1::Version& version,
   } else {
     fetch_stream(coordinator, version, part, report, outcome);
   }
-  if (!is_this_version(part.path(), version)) {
+  if (!is_this_version(part.path(), version, Checked::kContents)) {
     part.shorten(0);
     throw core::Error(core::Code::kDataLoss,
                       "what came of " + reference_text(version) +

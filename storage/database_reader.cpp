@@ -100,6 +100,10 @@ core::Digest verify_database(const std::filesystem::path& path) {
   });
 }
 
+core::Digest checked_digest(const std::filesystem::path& path) {
+  return naming_file(path.string(), [&path] { return check_digest(core::InputFile(path)); });
+}
+
 core::Digest content_digest(const std::filesystem::path& path) {
   return user_block_of(core::InputFile(path)).digest;
 }

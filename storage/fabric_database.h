@@ -83,6 +83,10 @@ core::Digest write_database(const FabricDatabase& database, const std::filesyste
 // read_database.
 core::Digest verify_database(const std::filesystem::path& path);
 
+// The same, after checking it against the file's bytes alone: nothing is parsed. Throws as
+// read_database does of damaged bytes.
+[[nodiscard]] core::Digest checked_digest(const std::filesystem::path& path);
+
 // The digest in the user block, unchecked.
 [[nodiscard]] core::Digest content_digest(const std::filesystem::path& path);
 
