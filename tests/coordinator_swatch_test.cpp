@@ -170,14 +170,19 @@ class FakeNode final : public v1::RenderService::Service {
     ++orders;
     v1::RenderRequest request;
     stream->Read(&request);
-    last_scene = request.order().scene();
+    const v1::Scene scene = request.order().scene();
+    last_scene = scene;
     while (is_slow && !context->IsCancelled()) {
       std::this_thread::yield();
+    }
+    if (context->IsCancelled()) {
+      ++given_up;
+      return grpc::Status::CANCELLED;
     }
     if (!answer.ok()) {
       return answer;
     }
-    const std::uint32_t width = last_scene.picture().width();
+    const std::uint32_t width = scene.picture().width();
     v1::RenderResponse event;
     event.mutable_picture()->set_width(is_wrong ? 1'000'000 : width);
     event.mutable_picture()->set_height(width);
@@ -193,6 +198,7 @@ class FakeNode final : public v1::RenderService::Service {
       event.set_chunk(part);
       stream->Write(event);
     }
+    ++answered;
     return grpc::Status::OK;
   }
   grpc::Status GetNode(grpc::ServerContext* /*context*/, const v1::GetNodeRequest* /*request*/,
@@ -202,6 +208,8 @@ class FakeNode final : public v1::RenderService::Service {
   }
 
   std::atomic<int> orders = 0;
+  std::atomic<int> answered = 0;
+  std::atomic<int> given_up = 0;
   std::atomic<bool> is_slow = false;
   bool is_wrong = false;
   grpc::Status answer;
@@ -224,8 +232,9 @@ class SwatchesTest : public PageTest {
     PageTest::TearDown();
     node_.reset();
   }
-  void open_with_node() {
+  void open_with_node(bool draws_ahead = false) {
     PageOptions options;
+    options.draws_ahead = draws_ahead;
     options.render_node.address = node_address_;
     open(options);
   }
@@ -312,6 +321,70 @@ TEST_F(SwatchesTest, SoManyPicturesAtATimeAndNoneHoldsUpTheEnd) {
   for (std::thread& asker : askers) {
     asker.join();
   }
+}
+
+TEST_F(SwatchesTest, AThumbnailIsDrawnWhenItsVersionIsPublished) {
+  open_with_node(true);
+  ASSERT_EQ(publish("r2", "linen").state(), v1::JOB_STATE_SUCCEEDED);
+  while (node_->answered == 0) {
+    std::this_thread::yield();
+  }
+  // The version that was there before waits for somebody who looks.
+  EXPECT_EQ(node_->last_scene.cloths(0).fabric(), "linen@1");
+  EXPECT_EQ(get("/api/swatches/linen/1?kind=thumbnail").status, 200);
+  EXPECT_EQ(node_->orders, 1);
+}
+
+TEST_F(SwatchesTest, AThumbnailMakesWayForATurnedSwatchAndIsDrawnAfterIt) {
+  node_->is_slow = true;
+  int status = 0;
+  std::thread asker([&] {
+    httplib::Client client(page_->url().substr(0, page_->url().size() - 1));
+    client.set_read_timeout(60);
+    const httplib::Result result = client.Get("/api/swatches/tiny/1?kind=thumbnail");
+    status = result ? result->status : 0;
+  });
+  while (node_->orders < 1) {
+    std::this_thread::yield();
+  }
+  httplib::Client client(page_->url().substr(0, page_->url().size() - 1));
+  client.set_read_timeout(60);
+  std::thread turner([&] { EXPECT_EQ(client.Get("/api/swatches/tiny/1?size=32")->status, 200); });
+  while (node_->orders < 2) {
+    std::this_thread::yield();
+  }
+  while (node_->given_up < 1) {  // the thumbnail was, though the node still draws for the other
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(node_->orders, 2) << "it is not ordered again while somebody waits";
+  node_->is_slow = false;
+  turner.join();
+  asker.join();
+  EXPECT_EQ(status, 200);
+  EXPECT_EQ(node_->orders, 3);
+}
+
+TEST_F(SwatchesTest, TwoWhoWantOneThumbnailHaveItDrawnOnce) {
+  node_->is_slow = true;
+  std::vector<std::thread> askers;
+  std::atomic<int> good = 0;
+  for (int i = 0; i < 3; ++i) {
+    askers.emplace_back([&] {
+      httplib::Client client(page_->url().substr(0, page_->url().size() - 1));
+      client.set_read_timeout(60);
+      const httplib::Result result = client.Get("/api/swatches/tiny/1?kind=thumbnail");
+      good += result && result->status == 200 ? 1 : 0;
+    });
+  }
+  while (node_->orders < 1) {
+    std::this_thread::yield();
+  }
+  node_->is_slow = false;
+  for (std::thread& asker : askers) {
+    asker.join();
+  }
+  EXPECT_EQ(good, 3);
+  EXPECT_EQ(node_->orders, 1);
 }
 
 TEST_F(SwatchesTest, WhatAViewerWishesNowEndsWhatItWishedBefore) {

@@ -110,6 +110,9 @@ Page::Page(Scheduler& scheduler, Metrics& metrics, const PageOptions& options)
       disk_use_(scheduler) {
   server_ = std::make_unique<HttpServer>(
       options.listen, gate_, [this](const HttpRequest& request) { return answer(request); });
+  if (options.draws_ahead && painter_.has_node()) {
+    thumbnails_ahead_ = std::make_unique<ThumbnailsAhead>(scheduler.catalogue(), swatches_);
+  }
   spdlog::info("event=page address={} tls={} render_node={}", server_->address(),
                gate_.speaks_tls(), painter_.has_node() ? painter_.address() : "none");
 }
@@ -123,6 +126,7 @@ std::string Page::url() const {
 void Page::stop() {
   board_.stop();
   painter_.stop();
+  thumbnails_ahead_.reset();
   server_->stop();
 }
 

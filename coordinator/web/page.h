@@ -15,6 +15,7 @@
 #include "coordinator/web/painter.h"
 #include "coordinator/web/swatch_cache.h"
 #include "coordinator/web/swatches.h"
+#include "coordinator/web/thumbnails_ahead.h"
 #include "security/endpoint.h"
 #include "security/web_gate.h"
 
@@ -26,6 +27,7 @@ struct PageOptions {
   security::Endpoint render_node;      // empty address: there is none
   std::filesystem::path state_folder;  // thumbnails are kept in swatches/ there
   std::uint64_t swatches_limit_bytes = std::uint64_t{64} << 20;
+  bool draws_ahead = true;  // thumbnails of versions as they are published
 };
 
 // The status page: what the coordinator does, for people and for Prometheus, over HTTP. It only
@@ -65,6 +67,7 @@ class Page {
   Board board_;
   DiskUse disk_use_;
   std::atomic<int> streams_ = 0;
+  std::unique_ptr<ThumbnailsAhead> thumbnails_ahead_;
   std::unique_ptr<HttpServer> server_;
 };
 

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "proto/status.h"
 #include "security/channel.h"
@@ -35,15 +36,19 @@ std::string new_request_id() {
       "the render node at " + address + " does not answer; is weft-render running there?");
 }
 
+[[noreturn]] void throw_too_late(const std::string& address) {
+  throw core::Error(core::Code::kUnavailable,
+                    "the render node at " + address +
+                        " did not draw in time; it may be loading the fabric, or drawing for "
+                        "others. Ask again in a while");
+}
+
 void throw_unless_ok(const grpc::Status& status, const std::string& address) {
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE) {
     throw_away(address);
   }
   if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
-    throw core::Error(core::Code::kUnavailable,
-                      "the render node at " + address +
-                          " did not draw in time; it may be loading "
-                          "the fabric, or drawing for others. Ask again in a while");
+    throw_too_late(address);
   }
   v1::throw_unless_ok(status, "draw on " + address);
 }
@@ -64,18 +69,27 @@ std::size_t colour_bytes(const v1::PictureHeader& header) {
 
 class Painter::Order {
  public:
-  Order(Painter& painter, grpc::ClientContext& context, const std::string& viewer)
+  Order(Painter& painter, grpc::ClientContext& context, const Wish& wish)
       : painter_(painter), context_(context) {
-    const std::lock_guard lock(painter_.mutex_);
+    std::unique_lock lock(painter_.mutex_);
+    if (wish.makes_way) {
+      painter_.fewer_.wait_for(lock, wish.in_time,
+                               [&] { return painter_.is_stopped_ || painter_.orders_.empty(); });
+    }
     if (painter_.is_stopped_) {
       throw core::Error(core::Code::kUnavailable, "the coordinator is stopping");
     }
+    if (wish.makes_way && !painter_.orders_.empty()) {
+      throw core::Error(core::Code::kUnavailable,
+                        "the render node draws for others all the time; ask again in a while");
+    }
     std::erase_if(painter_.orders_, [&](const auto& order) {
-      const bool is_outdated = !viewer.empty() && order.second == viewer;
-      if (is_outdated) {
+      const bool is_outdated = !wish.viewer.empty() && order.second.viewer == wish.viewer;
+      if (is_outdated || order.second.makes_way) {
         order.first->TryCancel();
+        return true;
       }
-      return is_outdated;
+      return false;
     });
     if (painter_.orders_.size() >= kOrdersAtOnce) {
       throw core::Error(core::Code::kResourceExhausted,
@@ -83,11 +97,17 @@ class Painter::Order {
                                     "limit; ask again in a while",
                                     painter_.orders_.size()));
     }
-    painter_.orders_.emplace(&context_, viewer);
+    painter_.orders_.emplace(&context_, wish);
   }
   ~Order() {
     const std::lock_guard lock(painter_.mutex_);
     painter_.orders_.erase(&context_);
+    painter_.fewer_.notify_all();
+  }
+  // Whether a later order has ended this one.
+  [[nodiscard]] bool made_way() const {
+    const std::lock_guard lock(painter_.mutex_);
+    return !painter_.is_stopped_ && !painter_.orders_.contains(&context_);
   }
   Order(const Order&) = delete;
   Order& operator=(const Order&) = delete;
@@ -108,14 +128,37 @@ Painter::Painter(const security::Endpoint& node) : address_(node.address) {
 
 Painter::Painting Painter::paint(const v1::Scene& scene, std::chrono::milliseconds in_time,
                                  const std::string& viewer) {
+  std::optional<Painting> painting = order(scene, {in_time, viewer, false});
+  if (!painting) {
+    throw core::Error(core::Code::kCancelled, "another picture was asked for meanwhile");
+  }
+  return *std::move(painting);
+}
+
+Painter::Painting Painter::paint_at_leisure(const v1::Scene& scene,
+                                            std::chrono::milliseconds in_time) {
+  const core::Stopwatch since_wish;
+  while (true) {
+    const auto left =
+        in_time - std::chrono::milliseconds(static_cast<std::int64_t>(1000 * since_wish.seconds()));
+    if (left <= std::chrono::milliseconds(0)) {
+      throw_too_late(address_);
+    }
+    if (std::optional<Painting> painting = order(scene, {left, "", true})) {
+      return *std::move(painting);
+    }
+  }
+}
+
+std::optional<Painter::Painting> Painter::order(const v1::Scene& scene, const Wish& wish) {
   if (!has_node()) {
     throw core::Error(core::Code::kFailedPrecondition,
                       "no render node is named; start the coordinator with --render-node HOST:PORT "
                       "of a weft-render");
   }
   grpc::ClientContext context;
-  const Order order(*this, context, viewer);
-  set_deadline(context, in_time);
+  const Order order(*this, context, wish);
+  set_deadline(context, wish.in_time);
   v1::RenderRequest request;
   request.mutable_order()->set_request_id(new_request_id());
   *request.mutable_order()->mutable_scene() = scene;
@@ -143,6 +186,9 @@ Painter::Painting Painter::paint(const v1::Scene& scene, std::chrono::millisecon
     throw;
   }
   const grpc::Status status = stream->Finish();
+  if (!status.ok() && order.made_way()) {
+    return std::nullopt;
+  }
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE &&
       channel_->GetState(false) == GRPC_CHANNEL_READY) {
     throw core::Error(core::Code::kUnavailable, "the render node at " + address_ +
@@ -179,9 +225,10 @@ v1::GetNodeResponse Painter::node() {
 void Painter::stop() {
   const std::lock_guard lock(mutex_);
   is_stopped_ = true;
-  for (const auto& [context, viewer] : orders_) {
+  for (const auto& [context, wish] : orders_) {
     context->TryCancel();
   }
+  fewer_.notify_all();
 }
 
 }  // namespace weft::coordinator

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +18,8 @@
 
 namespace weft::coordinator {
 
-// Pictures that are ordered of the render node at the same time; it draws one after the other.
+// Pictures that people wait for and that are ordered of the render node at the same time; it draws
+// one after the other.
 inline constexpr std::size_t kOrdersAtOnce = 3;
 // Of floats, and as many again while they are put together.
 inline constexpr std::uint32_t kPictureSideLimit = 640;
@@ -44,21 +47,35 @@ class Painter {
   [[nodiscard]] Painting paint(const v1::Scene& scene, std::chrono::milliseconds in_time,
                                const std::string& viewer);
 
-  // Errors as above.
+  // The same for a picture that makes way: it is ordered when no other is on its way, given up when
+  // somebody wants one, and ordered again. Throws as paint(), and kUnavailable when it has not come
+  // `in_time`.
+  [[nodiscard]] Painting paint_at_leisure(const v1::Scene& scene,
+                                          std::chrono::milliseconds in_time);
+
+  // Errors as paint().
   [[nodiscard]] v1::GetNodeResponse node();
 
   // Ends what is being drawn, and draws no more.
   void stop();
 
  private:
-  // A call that stop() reaches, one of kOrdersAtOnce.
+  // A call that stop() reaches.
   class Order;
+  struct Wish {
+    std::chrono::milliseconds in_time;
+    std::string viewer;
+    bool makes_way = false;
+  };
+  // Nothing when it made way.
+  [[nodiscard]] std::optional<Painting> order(const v1::Scene& scene, const Wish& wish);
 
   std::string address_;
   std::shared_ptr<grpc::Channel> channel_;  // shared: gRPC's stub asks for it
   std::unique_ptr<v1::RenderService::Stub> stub_;
-  std::mutex mutex_;                                    // guards all below
-  std::map<grpc::ClientContext*, std::string> orders_;  // and their viewers; without cancelled ones
+  std::mutex mutex_;  // guards all below
+  std::condition_variable fewer_;
+  std::map<grpc::ClientContext*, Wish> orders_;  // without cancelled ones
   bool is_stopped_ = false;
 };
 

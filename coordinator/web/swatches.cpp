@@ -1,5 +1,6 @@
 #include "coordinator/web/swatches.h"
 
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -7,6 +8,7 @@
 #include "coordinator/web/png.h"
 #include "coordinator/web/swatch_view.h"
 #include "core/clock.h"
+#include "core/error.h"
 
 namespace weft::coordinator {
 
@@ -26,34 +28,79 @@ HttpAnswer png_answer(std::string png) {
   return answer;
 }
 
+std::string reference_of(const VersionRecord& version) {
+  return fmt::format("{}@{}", version.fabric, version.number);
+}
+
 }  // namespace
+
+class Swatches::Place {
+ public:
+  // Waits while another draws the same.
+  Place(Swatches& swatches, std::string name) : swatches_(swatches), name_(std::move(name)) {
+    std::unique_lock lock(swatches_.mutex_);
+    if (swatches_.waiting_ >= kThumbnailsAtOnce) {
+      throw core::Error(core::Code::kResourceExhausted,
+                        fmt::format("thumbnails_limit: {} thumbnails are waited for, which is the "
+                                    "limit; ask again in a while",
+                                    swatches_.waiting_));
+    }
+    ++swatches_.waiting_;
+    swatches_.drawn_.wait(lock, [this] { return !swatches_.under_way_.contains(name_); });
+    swatches_.under_way_.insert(name_);
+  }
+  ~Place() {
+    const std::lock_guard lock(swatches_.mutex_);
+    swatches_.under_way_.erase(name_);
+    --swatches_.waiting_;
+    swatches_.drawn_.notify_all();
+  }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+  Place(Place&&) = delete;
+  Place& operator=(Place&&) = delete;
+
+ private:
+  Swatches& swatches_;
+  std::string name_;
+};
 
 HttpAnswer Swatches::picture(const std::string& reference,
                              const std::map<std::string, std::string>& query) {
   const VersionRecord version = catalogue_.find(reference);
   const auto kind = query.find("kind");
-  if (kind == query.end() || kind->second != "thumbnail") {
-    return draw(version, query, false);
-  }
-  const std::string name = version.content_digest.hex() + "-" + kThumbnailEdition;
-  if (std::optional<std::string> png = cache_.find(name)) {
-    return png_answer(*std::move(png));
-  }
-  HttpAnswer answer = draw(version, {}, true);
-  cache_.keep(name, answer.body);
-  return answer;
+  const bool is_thumbnail = kind != query.end() && kind->second == "thumbnail";
+  return is_thumbnail ? png_answer(thumbnail(version)) : draw_turned(version, query);
 }
 
-HttpAnswer Swatches::draw(const VersionRecord& version,
-                          const std::map<std::string, std::string>& query, bool is_thumbnail) {
+std::string Swatches::thumbnail(const VersionRecord& version) {
+  const std::string name = version.content_digest.hex() + "-" + kThumbnailEdition;
+  if (std::optional<std::string> png = cache_.find(name)) {
+    return *std::move(png);
+  }
+  const Place place(*this, name);
+  if (std::optional<std::string> png = cache_.find(name)) {
+    return *std::move(png);
+  }
+  const core::Stopwatch since_order;
+  const Painter::Painting painting =
+      painter_.paint_at_leisure(scene_of(SwatchView(), reference_of(version)), kThumbnailWithin);
+  metrics_.swatch_drawn(true, since_order.seconds());
+  std::string png =
+      png_of(painting.rgb, painting.width, painting.height, automatic_exposure(painting.rgb));
+  cache_.keep(name, png);
+  return png;
+}
+
+HttpAnswer Swatches::draw_turned(const VersionRecord& version,
+                                 const std::map<std::string, std::string>& query) {
   const SwatchView view = swatch_view_from(query);
   const auto viewer = query.find("viewer");
   const core::Stopwatch since_order;
   const Painter::Painting painting =
-      painter_.paint(scene_of(view, fmt::format("{}@{}", version.fabric, version.number)),
-                     is_thumbnail ? kThumbnailWithin : kPictureWithin,
+      painter_.paint(scene_of(view, reference_of(version)), kPictureWithin,
                      viewer == query.end() ? std::string() : viewer->second);
-  metrics_.swatch_drawn(is_thumbnail, since_order.seconds());
+  metrics_.swatch_drawn(false, since_order.seconds());
   const float stops = view.stops.value_or(automatic_exposure(painting.rgb));
   HttpAnswer answer = png_answer(png_of(painting.rgb, painting.width, painting.height, stops));
   answer.headers.emplace_back("X-Weft-Stops", fmt::format("{:.3f}", stops));

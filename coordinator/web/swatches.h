@@ -1,6 +1,9 @@
 #pragma once
 
+#include <condition_variable>
 #include <map>
+#include <mutex>
+#include <set>
 #include <string>
 
 #include "coordinator/scheduler/scheduler.h"
@@ -10,6 +13,9 @@
 #include "coordinator/web/swatch_cache.h"
 
 namespace weft::coordinator {
+
+// Who may wait for thumbnails at the same time: each holds a thread of the server.
+inline constexpr std::size_t kThumbnailsAtOnce = 8;
 
 // Pictures of published versions, as the render node draws them. Any thread.
 class Swatches {
@@ -26,14 +32,25 @@ class Swatches {
   [[nodiscard]] HttpAnswer picture(const std::string& reference,
                                    const std::map<std::string, std::string>& query);
 
+  // A PNG of the view that represents the version: drawn once, when nobody waits for a turned one,
+  // and kept. Throws core::Error: kResourceExhausted when kThumbnailsAtOnce are waited for, and
+  // what Painter::paint_at_leisure throws.
+  [[nodiscard]] std::string thumbnail(const VersionRecord& version);
+
  private:
-  [[nodiscard]] HttpAnswer draw(const VersionRecord& version,
-                                const std::map<std::string, std::string>& query, bool is_thumbnail);
+  // One who waits for a thumbnail, and who draws it if nobody does.
+  class Place;
+  [[nodiscard]] HttpAnswer draw_turned(const VersionRecord& version,
+                                       const std::map<std::string, std::string>& query);
 
   Catalogue& catalogue_;
   Painter& painter_;
   SwatchCache& cache_;
   Metrics& metrics_;
+  std::mutex mutex_;  // guards all below
+  std::condition_variable drawn_;
+  std::size_t waiting_ = 0;
+  std::set<std::string> under_way_;  // thumbnails that are being drawn, by name
 };
 
 }  // namespace weft::coordinator

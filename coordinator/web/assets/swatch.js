@@ -164,7 +164,10 @@ export class SwatchViewer {
         await this.drawOnce(view, this.sizeWithin(DRAFT_S), 1);
         if (this.isMoving) await pause(SETTLED_MS);
         this.isFine = true;
-        if (!this.wish) await this.drawOnce(view, this.sizeWithin(FINE_S), this.samplesWithin(FINE_S));
+        // As large as it gets, with few samples and then with more.
+        for (let samples = 1; !this.wish && samples; samples = this.samplesAfter(samples)) {
+          await this.drawOnce(view, this.sizeWithin(FINE_S), samples);
+        }
       } catch (problem) {
         if (this.gone) return;
         if (problem.name === "AbortError" || problem.code === "cancelled") continue;
@@ -196,9 +199,11 @@ export class SwatchViewer {
     return SIZES.findLast((size) => size * size <= seconds * this.pixelsPerSecond) ?? SIZES[0];
   }
 
-  samplesWithin(seconds) {
-    const size = this.sizeWithin(seconds);
-    return Math.min(SAMPLES, Math.max(1, Math.floor((seconds * this.pixelsPerSecond) / (size * size))));
+  // Of the picture that follows one of so many; 0: none is worth the wait.
+  samplesAfter(samples) {
+    const size = this.sizeWithin(FINE_S);
+    const most = Math.min(SAMPLES, Math.floor((FINE_S * this.pixelsPerSecond) / (size * size)));
+    return most > samples ? most : 0;
   }
 
   async drawOnce({ brightness, ...view }, size, samples) {

@@ -5,7 +5,7 @@ import { problemOf } from "./live.js";
 
 const AT_ONCE = 2;
 const RETRY_MS = 1500;
-const TRIES = 20;
+const TRIES = 100;
 const waiting = [];
 let underWay = 0;
 
