@@ -2,6 +2,9 @@
 
 #include <system_error>
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include "core/error.h"
 
 namespace weft::cli {
@@ -18,6 +21,12 @@ void check_output_file(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(folder, failure)) {
     throw core::Error(core::Code::kNotFound,
                       "there is no folder " + folder.string() + " for the output; make it first");
+  }
+  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0) {
+    throw core::Error(core::Code::kPermissionDenied,
+                      "the folder " + folder.string() +
+                          " cannot be written to; name a file in another one, or have its rights "
+                          "changed");
   }
 }
 

@@ -83,18 +83,34 @@ double default_tiles(const fabric::Tile& tile, fabric::Role role, double tile_mm
                      : std::ceil(kDefaultSwatchMm / tile_mm);
 }
 
+// What the files of a piece of cloth hold.
+struct ClothFiles {
+  std::optional<BlockPattern> pattern;
+  std::optional<ObjMesh> mesh;
+};
+
+ClothFiles read_files_of(const v1::Cloth& cloth, const FileSource& files) {
+  ClothFiles read;
+  if (cloth.has_pattern()) {
+    read.pattern = pattern_of(cloth.pattern(), files);
+  }
+  if (cloth.has_shell()) {
+    read.mesh = read_mesh_text(files(cloth.shell().obj_file()), cloth.shell().obj_file());
+  }
+  return read;
+}
+
 // One fabric, or the several of a pattern.
 ClothFabric fabrics_of(const v1::Cloth& cloth, const FabricSource& fabrics,
-                       const FileSource& files) {
-  if (!cloth.has_pattern()) {
+                       std::optional<BlockPattern> pattern) {
+  if (!pattern) {
     return ClothFabric(fabrics(cloth.fabric()));
   }
-  BlockPattern pattern = pattern_of(cloth.pattern(), files);
   std::vector<std::shared_ptr<const Fabric>> several;  // shared: as FabricSource gives them
   for (const std::string& name : cloth.pattern().fabrics()) {
     several.push_back(fabrics(name));
   }
-  return {std::move(several), std::move(pattern)};
+  return {std::move(several), *std::move(pattern)};
 }
 
 std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics) {
@@ -120,10 +136,9 @@ std::unique_ptr<Cloth> flat_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics
   return make_flat_cloth(std::move(fabrics), placement);
 }
 
-std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics,
-                                      const FileSource& files, std::vector<std::string>& remarks) {
+std::unique_ptr<Cloth> shell_cloth_of(const v1::Cloth& cloth, ClothFabric fabrics, ObjMesh mesh,
+                                      std::vector<std::string>& remarks) {
   const v1::ShellMesh& shell = cloth.shell();
-  ObjMesh mesh = read_mesh_text(files(shell.obj_file()), shell.obj_file());
   const bool is_gltf = is_gltf_name(shell.obj_file());
   const double otherwise_mm = is_gltf ? 1000 : 1;
   const double scale_mm = shell.mesh_scale_mm() > 0 ? shell.mesh_scale_mm() : otherwise_mm;
@@ -219,11 +234,18 @@ Scene build_scene(const v1::Scene& description, const FabricSource& fabrics,
   for (const v1::Light& light : whole.lights()) {
     scene.lights.push_back(light_of(light, whole.cut_lights_at_horizon(), files));
   }
+  // Databases take longest to fetch and to read: what is wrong with the other files is said before.
+  std::vector<ClothFiles> read;
   for (const v1::Cloth& cloth : whole.cloths()) {
-    ClothFabric of = fabrics_of(cloth, fabrics, files);
-    scene.cloths.push_back(cloth.has_shell()
-                               ? shell_cloth_of(cloth, std::move(of), files, scene.remarks)
-                               : flat_cloth_of(cloth, std::move(of)));
+    read.push_back(read_files_of(cloth, files));
+  }
+  for (int i = 0; i < whole.cloths_size(); ++i) {
+    const v1::Cloth& cloth = whole.cloths(i);
+    ClothFiles& of = read[static_cast<std::size_t>(i)];
+    ClothFabric woven = fabrics_of(cloth, fabrics, std::move(of.pattern));
+    scene.cloths.push_back(
+        of.mesh ? shell_cloth_of(cloth, std::move(woven), *std::move(of.mesh), scene.remarks)
+                : flat_cloth_of(cloth, std::move(woven)));
   }
   scene.camera = camera_of(whole, bounds_of(scene.cloths));
   scene.background = colour_or(true, whole.picture().background(), 0);

@@ -59,6 +59,34 @@ TEST_F(RenderCommand, SaysWhenAFabricHasChangedSinceThePictureWasDrawn) {
   EXPECT_NE(again.err.find("fibre.h5 is not what it was"), std::string::npos) << again.err;
 }
 
+// A database that cannot be read, so that whoever reads it first says so.
+TEST_F(RenderCommand, NamesWhatIsWrongWithOtherFilesBeforeItReadsTheDatabase) {
+  core::write_file_atomically(folder_ / "fibre.h5", "no database");
+  const std::string scene = bytes("scene.textproto");
+  const auto said = [&](const std::string& text, const std::string& out = "a.exr") {
+    core::write_file_atomically(folder_ / "scene.textproto", text);
+    const Finished finished = render({"-o", folder_ / out});
+    EXPECT_NE(finished.code, 0);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / out));
+    return finished.err;
+  };
+  const auto shell = [&](const std::string& mesh) {
+    return "cloths { shell { obj_file: \"" + mesh + "\" thickness_mm: 0.1 } }";
+  };
+  EXPECT_NE(said(scene).find("fibre.h5"), std::string::npos);
+  EXPECT_NE(said(shell("missing.obj")).find("missing.obj"), std::string::npos);
+  core::write_file_atomically(folder_ / "broken.obj", "v 0 0\n");
+  EXPECT_NE(said(shell("broken.obj")).find("broken.obj"), std::string::npos);
+  EXPECT_NE(said(scene + "lights { environment { exr_file: \"sky.exr\" } }").find("sky.exr"),
+            std::string::npos);
+  EXPECT_NE(said(scene, "nowhere/a.exr").find("nowhere"), std::string::npos);
+  // The mesh of a frame an hour from now.
+  core::write_file_atomically(folder_ / "cloth_1.obj", "");
+  EXPECT_NE(said(shell("cloth_%d.obj") + "animation { first_frame: 1 frames: 2 }", "a_%d.exr")
+                .find("cloth_2.obj"),
+            std::string::npos);
+}
+
 TEST_F(RenderCommand, PassesEndInTheSamePicture) {
   ASSERT_EQ(render({"-o", folder_ / "a.exr", "--png", folder_ / "a.png"}).code, 0);
   ASSERT_EQ(render({"-o", folder_ / "b.exr", "--png", folder_ / "b.png", "--progressive"}).code, 0);
