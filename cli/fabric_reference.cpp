@@ -64,7 +64,8 @@ std::filesystem::path environment_cache_folder() {
 }
 
 std::filesystem::path resolve_fabric(const std::string& reference,
-                                     const security::Endpoint& coordinator) {
+                                     const security::Endpoint& coordinator,
+                                     const std::function<bool()>& should_stop) {
   const std::optional<FabricReference> parsed = parse_reference(reference);
   if (!parsed) {
     std::error_code failure;
@@ -83,7 +84,11 @@ std::filesystem::path resolve_fabric(const std::string& reference,
   Client connection(coordinator);
   const v1::Version version = client::find_version(connection, reference);
   const client::FabricCache cache(fabric_cache_folder(), kCacheLimitBytes);
-  return cache.fetch(connection, version, nullptr);
+  return cache.fetch(connection, version, [&](std::uint64_t here, std::uint64_t total) {
+    if (should_stop && here < total && should_stop()) {
+      throw core::Error(core::Code::kCancelled, "cancelled while fetching " + reference);
+    }
+  });
 }
 
 }  // namespace weft::cli

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -29,9 +30,11 @@ struct FabricReference {
 // that is fetched from the coordinator at `coordinator` (host:port) into the local cache, unless it
 // is there already. What reads as a published version is never taken for a path; write ./silk for a
 // file of such a name. Throws core::Error: kNotFound when there is no such file, fabric or version,
-// kUnavailable when the coordinator does not answer.
+// kUnavailable when the coordinator does not answer, kCancelled when `should_stop`, which may be
+// empty, said so while it was fetched; what came is kept.
 [[nodiscard]] std::filesystem::path resolve_fabric(const std::string& reference,
-                                                   const security::Endpoint& coordinator);
+                                                   const security::Endpoint& coordinator,
+                                                   const std::function<bool()>& should_stop = {});
 
 // Where fetched databases are kept: $XDG_CACHE_HOME/weft/fabrics, else ~/.cache/weft/fabrics.
 [[nodiscard]] std::filesystem::path fabric_cache_folder();

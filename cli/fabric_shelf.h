@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 
@@ -13,9 +14,9 @@ namespace weft::cli {
 class FabricShelf {
  public:
   // `main_reference` is what an empty reference means; published versions are fetched from
-  // `coordinator`.
+  // `coordinator`, until `should_stop` says so.
   FabricShelf(std::string main_reference, security::Endpoint coordinator,
-              render::Fabric::Wanted wanted);
+              render::Fabric::Wanted wanted, std::function<bool()> should_stop);
 
   // Loads what `reference` (a database's or description's path, or a published version) names.
   // Throws core::Error.
@@ -28,6 +29,7 @@ class FabricShelf {
   std::string main_reference_;
   security::Endpoint coordinator_;
   render::Fabric::Wanted wanted_;
+  std::function<bool()> should_stop_;
   std::map<std::string, render::LoadedFabric> fabrics_;
 };
 

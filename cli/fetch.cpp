@@ -8,6 +8,7 @@
 #include "cli/add_command.h"
 #include "cli/client.h"
 #include "cli/commands.h"
+#include "cli/end_in_time.h"
 #include "cli/fabric_reference.h"
 #include "cli/import_database.h"
 #include "cli/interruption.h"
@@ -35,6 +36,9 @@ constexpr const char* kHelp =
     "program that can do nothing else, and gets its name when everything in it is right.\n"
     "Examples: weft fetch silk@latest -o silk.h5\n"
     "          weft fetch --import from_a_friend.h5 -o linen.h5";
+
+// What Ctrl-C gets from a coordinator that answers no more.
+constexpr double kGraceSeconds = 2;
 
 struct FetchOptions {
   security::Endpoint coordinator;
@@ -104,6 +108,8 @@ void run(const FetchOptions& options) {
     return;
   }
   const Interruption interruption(1);
+  const EndInTime end(interruption, kGraceSeconds,
+                      "stopped; what came is kept: run the same command again to go on");
   Client connection(options.coordinator);
   const v1::Version version = client::find_version(connection, options.reference);
   const std::string output =

@@ -53,10 +53,7 @@ void Interruption::hear(int signal) {
   changed_.notify_all();
 }
 
-bool Interruption::requested() const {
-  const std::lock_guard lock(mutex_);
-  return count_ > 0;
-}
+bool Interruption::requested() const { return count_ > 0; }
 
 bool Interruption::is_by_a_person() const {
   const std::lock_guard lock(mutex_);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <csignal>
 #include <mutex>
@@ -51,7 +52,7 @@ class Interruption {
   sigset_t before_{};
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
-  int count_ = 0;
+  std::atomic<int> count_ = 0;  // asked at every pixel of a picture
   int first_ = 0;
   grpc::ClientContext* call_ = nullptr;
   std::jthread listener_;

@@ -151,14 +151,16 @@ std::string PictureFiles::what_is_kept() const {
     fmt::print(stderr, "\n");
   }
   if (samples_kept_ > 0) {
-    return fmt::format("the last whole pass, {} of {} samples a pixel, is on disk", samples_kept_,
-                       samples_wanted_);
+    return fmt::format(
+        "the last whole pass, {} of {} samples a pixel, is on disk; run the same command again for "
+        "all of them",
+        samples_kept_, samples_wanted_);
   }
   if (is_animation_) {
     return fmt::format("{} of {} frames are on disk; --resume goes on with the others",
                        written_.size(), frames_);
   }
-  return "nothing was written";
+  return "nothing was written; run the same command again to draw it";
 }
 
 }  // namespace weft::cli

@@ -9,8 +9,10 @@
 
 #include "cli/add_command.h"
 #include "cli/commands.h"
+#include "cli/end_in_time.h"
 #include "cli/fabric_reference.h"
 #include "cli/fabric_shelf.h"
+#include "cli/interruption.h"
 #include "cli/list_devices.h"
 #include "cli/picture_files.h"
 #include "cli/progress.h"
@@ -19,7 +21,6 @@
 #include "cli/render_report.h"
 #include "core/digest.h"
 #include "core/error.h"
-#include "core/interrupt.h"
 #include "render/animation.h"
 #include "render/draw_pictures.h"
 #include "render/make_integrator.h"
@@ -42,6 +43,9 @@ constexpr const char* kHelp =
     "  weft render --again drape.exr -o same.exr\n"
     "  weft render --list-devices";
 
+// Longer than what cannot be broken off takes: reading a database, writing a picture.
+constexpr double kGraceSeconds = 10;
+
 // Pictures drawn again from headers: a fabric may have changed under its name.
 void warn_of_changed_fabrics(const std::string& again, const FabricIdentities& now) {
   for (const auto& [reference, recorded] : read_recipe(again).fabrics) {
@@ -49,6 +53,18 @@ void warn_of_changed_fabrics(const std::string& again, const FabricIdentities& n
     if (found != now.end() && found->second.content_digest != recorded.content_digest) {
       fmt::print(stderr, "weft: {} is not what it was when {} was drawn; the picture will differ\n",
                  reference, again);
+    }
+  }
+}
+
+// Before anything is drawn: a frame an hour from now wants its mesh, too.
+void check_files_are_there(const v1::Scene& scene) {
+  for (const std::string& file : render::files_of(scene)) {
+    if (::access(file.c_str(), R_OK) != 0) {
+      throw core::Error(core::Code::kNotFound,
+                        "there is no file " + file +
+                            " that can be read, and the scene names it; its path is looked for "
+                            "from the scene's folder");
     }
   }
 }
@@ -109,12 +125,14 @@ void run(RenderOptions options) {
   if (options.fabric.empty() && options.again.empty()) {
     throw CLI::RequiredError("fabric");
   }
-  core::Interrupt interrupt;
+  const Interruption interruption(1);
   const v1::Scene scene = described_scene(options);
+  const auto should_stop = [&] { return interruption.requested(); };
   FabricShelf shelf(options.fabric, options.coordinator,
                     render::reads_transfer(scene.integration().integrator())
                         ? render::Fabric::Wanted::kFibresAndTransfer
-                        : render::Fabric::Wanted::kFibres);
+                        : render::Fabric::Wanted::kFibres,
+                    should_stop);
   std::optional<render::NodeClient> node;
   if (!options.node.empty()) {
     if (options.device != "auto") {
@@ -128,8 +146,10 @@ void run(RenderOptions options) {
                                     options.coordinator.insecure));
   }
   const auto identities = [&] { return node ? identities_of(*node) : shelf.identities(); };
-  const auto should_stop = [&] { return interrupt.requested(); };
   PictureFiles files(options, scene, identities);
+  check_files_are_there(scene);
+  const EndInTime end(interruption, kGraceSeconds,
+                      "stopped; pictures that were done stay, and --resume skips them");
   try {
     if (node) {
       node->draw_pictures(scene, options.progressive, render::files_on_disk(), files,
