@@ -10,6 +10,7 @@ but for those that are called CPU.
 """
 
 import argparse
+import collections
 import json
 import os
 import pathlib
@@ -68,6 +69,23 @@ def cpu_seconds(pid):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+# The coordinator's threads that plan, lease, journal and answer, and gRPC's that take the workers'
+# calls and carry all bytes of all calls: more than scheduling alone.
+SCHEDULING = ("weft-plan", "weft-dispatch", "weft-journal", "weft-answer", "nexting_thread",
+              "event_engine")
+
+
+def cpu_of_threads(pid):
+    """CPU seconds of the threads that there are now, by name."""
+    seconds = collections.Counter()
+    for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+        beginning, end = (task / "stat").read_text().rsplit(")", 1)
+        fields = end.split()
+        name = beginning.split("(", 1)[1]
+        seconds[name] += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return seconds
+
+
 class Cluster:
     """`weft up` with workers of one thread each, on a state folder of its own."""
 
@@ -109,20 +127,22 @@ def cluster_job(description, out, workers, quality):
                         "--coordinator", address], check=True, stdout=subprocess.DEVNULL,
                        stderr=subprocess.DEVNULL)
         seconds = time.monotonic() - since
+        threads = cpu_of_threads(pid)
         return (seconds, cpu_seconds(pid) - before,
                 sum(cpu_seconds(worker["pid"]) for worker in cluster.about["workers"]),
-                inspect(database)["content_digest"])
+                inspect(database)["content_digest"], sum(threads[name] for name in SCHEDULING))
 
 
 def workers(arguments):
     print_head(["fabric", "one worker", "two", "over half of one",
-                "CPU of the coordinator, of the workers (two)"])
+                "CPU of the coordinator, of the workers (two)", "scheduling at most"])
     for description in arguments.fabrics:
         one, two = (cluster_job(description, arguments.out, count, arguments.quality)
                     for count in (1, 2))
         same_content(one[3], two[3])
         print_row([description.stem, f"{one[0]:.1f} s", f"{two[0]:.1f} s",
-                   f"{100 * (2 * two[0] / one[0] - 1):+.1f} %", f"{two[1]:.2f} s, {two[2]:.1f} s"])
+                   f"{100 * (2 * two[0] / one[0] - 1):+.1f} %", f"{two[1]:.2f} s, {two[2]:.1f} s",
+                   f"{100 * two[4] / (two[1] + two[2]):.2f} %"])
 
 
 def resized(text, repeats):

@@ -7,6 +7,7 @@
 #include "coordinator/journal/schema.h"
 #include "coordinator/journal/state.h"
 #include "core/error.h"
+#include "core/named_thread.h"
 
 namespace weft::coordinator {
 
@@ -125,8 +126,8 @@ std::optional<core::Error> Journal::State::problem_of(Ticket ticket) const {
 
 Journal::Journal(const std::filesystem::path& file) : state_(std::make_unique<State>(file)) {
   state_->open();
-  state_->committer = std::thread([this] { state_->commit_loop(); });
-  state_->answerer = std::thread([this] { state_->answer_loop(); });
+  state_->committer = core::named_thread("weft-journal", [this] { state_->commit_loop(); });
+  state_->answerer = core::named_thread("weft-answer", [this] { state_->answer_loop(); });
 }
 
 Journal::~Journal() {

@@ -9,6 +9,7 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/folder.h"
+#include "core/named_thread.h"
 #include "fabric/description.h"
 #include "proto/arrays.h"
 #include "proto/limits.h"
@@ -55,9 +56,9 @@ Scheduler::Scheduler(SchedulerOptions options, const core::Clock& clock)
   core::make_folder(options_.state_folder / "committing");
   catalogue_.set_remake([this](const VersionRecord& version) { return remake(version); });
   load();
-  planner_ = std::thread([this] { work_through(to_plan_); });
-  committer_ = std::thread([this] { work_through(to_commit_); });
-  dispatcher_ = std::thread([this] { dispatch(); });
+  planner_ = core::named_thread("weft-plan", [this] { work_through(to_plan_); });
+  committer_ = core::named_thread("weft-commit", [this] { work_through(to_commit_); });
+  dispatcher_ = core::named_thread("weft-dispatch", [this] { dispatch(); });
 }
 
 Scheduler::~Scheduler() {
