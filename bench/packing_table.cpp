@@ -45,11 +45,11 @@ struct Openness {
   double open_share = 0;
 };
 Openness openness(const transport::Scene& scene) {
-  const transport::VisibilityRaster raster(scene);
+  const transport::VisibilityRaster raster(scene, kImageResolution);
   core::Random random(2, 0);
   Openness sum;
   for (std::uint32_t n = 0; n < kImages; ++n) {
-    const auto bits = raster.bits(random.below(scene.tile().segment_count()), kImageResolution);
+    const auto bits = raster.bits(random.below(scene.tile().segment_count()));
     const double open = transport::open_share(bits, kImageResolution);
     sum.blocked_share += open == 0 ? 1.0 / kImages : 0;
     sum.open_share += open / kImages;

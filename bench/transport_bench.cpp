@@ -88,7 +88,7 @@ void visibility_rays(benchmark::State& state) {
 BENCHMARK(visibility_rays)->Unit(benchmark::kMillisecond);
 
 const transport::VisibilityRaster& raster() {
-  static const transport::VisibilityRaster built(scene());
+  static const transport::VisibilityRaster built(scene(), kResolution);
   return built;
 }
 
@@ -96,7 +96,7 @@ void visibility_raster(benchmark::State& state) {
   static_cast<void>(raster());
   std::uint64_t i = 0;
   for (auto unused : state) {
-    benchmark::DoNotOptimize(raster().bits(some_segment(i++), kResolution));
+    benchmark::DoNotOptimize(raster().bits(some_segment(i++)));
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(i * kResolution * kResolution));
 }
@@ -105,7 +105,7 @@ BENCHMARK(visibility_raster)->Unit(benchmark::kMillisecond);
 std::vector<std::vector<std::uint8_t>> images(std::uint64_t count) {
   std::vector<std::vector<std::uint8_t>> all;
   for (std::uint64_t i = 0; i < count; ++i) {
-    all.push_back(raster().bits(some_segment(i), kResolution));
+    all.push_back(raster().bits(some_segment(i)));
   }
   return all;
 }

@@ -187,7 +187,7 @@ Row measure(const fabric::Tile& tile) {
   row.segments = tile.segment_count();
   const transport::Scene scene(tile);
   const transport::EmbreeScene embree(tile);
-  const transport::VisibilityRaster raster(scene);
+  const transport::VisibilityRaster raster(scene, kResolution);
   const auto segment = [&](std::uint32_t i) {
     return core::Random(11, 0, i).below(tile.segment_count());
   };
@@ -197,11 +197,10 @@ Row measure(const fabric::Tile& tile) {
   });
   constexpr std::uint32_t kAll = kSegments + kSample;
   std::vector<Bits> images(kAll);
-  row.by_raster_ms =
-      time_each(kAll, [&](std::uint32_t i) { images[i] = raster.bits(segment(i), kResolution); });
+  row.by_raster_ms = time_each(kAll, [&](std::uint32_t i) { images[i] = raster.bits(segment(i)); });
   setenv("WEFT_PORTABLE", "1", 1);
   row.portable_ms = time_each(kSegments, [&](std::uint32_t i) {
-    row.same = raster.bits(segment(i), kResolution) == images[i] && row.same;
+    row.same = raster.bits(segment(i)) == images[i] && row.same;
   });
   unsetenv("WEFT_PORTABLE");
   for (std::uint32_t i = 0; i < kByRays; ++i) {

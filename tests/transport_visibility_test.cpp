@@ -150,14 +150,14 @@ TEST(TransportVisibility, Bits_AreWhatRaysSay) {
 // Rays and the raster must see the same, but for rays that graze a fibre within rounding.
 void compare_raster_with_rays(const fabric::Tile& tile, std::uint32_t step) {
   const Scene scene(tile);
-  const VisibilityRaster raster(scene);
   constexpr std::uint32_t kResolution = 64;
+  const VisibilityRaster raster(scene, kResolution);
   std::uint32_t different = 0;
   std::uint32_t visible = 0;
   std::uint32_t pixels = 0;
   for (std::uint32_t k = 0; k < tile.segment_count(); k += step) {
     const auto by_rays = visibility_bits(scene, k, kResolution);
-    const auto by_raster = raster.bits(k, kResolution);
+    const auto by_raster = raster.bits(k);
     ASSERT_EQ(by_rays.size(), by_raster.size());
     for (std::uint32_t p = 0; p < kResolution * kResolution; ++p, ++pixels) {
       different += is_visible(by_rays, p) != is_visible(by_raster, p) ? 1 : 0;
@@ -194,12 +194,12 @@ TEST(TransportVisibilityRaster, SeesWhatEmbreeSees) {
   const fabric::Tile tile = test::random_hairs(300, 0.4f, 0.3f, 0.15f, 21);
   const Scene scene(tile);
   const EmbreeScene embree(tile);
-  const VisibilityRaster raster(scene);
+  const VisibilityRaster raster(scene, kResolution);
   std::uint32_t different = 0;
   std::uint32_t visible = 0;
   for (std::uint32_t k = 0; k < tile.segment_count(); k += 97) {
     const auto by_rays = visibility_bits(scene, embree, k, kResolution);
-    const auto by_raster = raster.bits(k, kResolution);
+    const auto by_raster = raster.bits(k);
     for (std::uint32_t p = 0; p < kResolution * kResolution; ++p) {
       different += is_visible(by_rays, p) != is_visible(by_raster, p) ? 1 : 0;
       visible += is_visible(by_rays, p) ? 1 : 0;
@@ -213,12 +213,12 @@ TEST(TransportVisibilityRaster, WideAndPortablePaths_GiveTheSameBits) {
   for (const std::uint64_t seed : {31U, 32U, 33U}) {
     const fabric::Tile tile = test::random_hairs(120, 0.5f, 0.4f, 0.2f, seed);
     const Scene scene(tile);
-    const VisibilityRaster raster(scene);
-    for (std::uint32_t k = 0; k < tile.segment_count(); k += 29) {
-      for (const std::uint32_t resolution : {40u, 128u}) {
-        const auto chosen = raster.bits(k, resolution);
+    for (const std::uint32_t resolution : {40u, 128u}) {
+      const VisibilityRaster raster(scene, resolution);
+      for (std::uint32_t k = 0; k < tile.segment_count(); k += 29) {
+        const auto chosen = raster.bits(k);
         setenv("WEFT_PORTABLE", "1", 1);
-        const auto portable = raster.bits(k, resolution);
+        const auto portable = raster.bits(k);
         unsetenv("WEFT_PORTABLE");
         ASSERT_EQ(chosen, portable) << "segment " << k << ", seed " << seed;
       }
@@ -229,10 +229,9 @@ TEST(TransportVisibilityRaster, WideAndPortablePaths_GiveTheSameBits) {
 TEST(TransportVisibilityRaster, AnyResolutionThatIsAMultipleOfEight_Works) {
   const fabric::Tile tile = test::crossed_layers(4, 8, 0.02f, 6);
   const Scene scene(tile);
-  const VisibilityRaster raster(scene);
   for (const std::uint32_t resolution : {8u, 24u, 72u, 200u}) {
     const auto by_rays = visibility_bits(scene, 5, resolution);
-    const auto by_raster = raster.bits(5, resolution);
+    const auto by_raster = VisibilityRaster(scene, resolution).bits(5);
     std::uint32_t different = 0;
     for (std::uint32_t p = 0; p < resolution * resolution; ++p) {
       different += is_visible(by_rays, p) != is_visible(by_raster, p) ? 1 : 0;

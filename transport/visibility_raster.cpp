@@ -177,21 +177,24 @@ class Painter {
 }  // namespace
 
 struct VisibilityRaster::State {
-  explicit State(const Scene& scene_in) : scene(scene_in), tree(scene_in) {}
+  State(const Scene& scene_in, std::uint32_t resolution)
+      : scene(scene_in), tree(scene_in), grid(resolution) {}
   const Scene& scene;
   CapsuleTree tree;
+  SphereGrid grid;
 };
 
-VisibilityRaster::VisibilityRaster(const Scene& scene) : state_(std::make_unique<State>(scene)) {}
+VisibilityRaster::VisibilityRaster(const Scene& scene, std::uint32_t resolution) {
+  CHECK_EQ(resolution % 8, 0U);
+  CHECK_LE(resolution, kMaxMaskResolution);
+  state_ = std::make_unique<State>(scene, resolution);
+}
 
 VisibilityRaster::~VisibilityRaster() = default;
 
-std::vector<std::uint8_t> VisibilityRaster::bits(std::uint32_t segment, std::uint32_t resolution,
+std::vector<std::uint8_t> VisibilityRaster::bits(std::uint32_t segment,
                                                  const Checkpoint& checkpoint) const {
-  CHECK_EQ(resolution % 8, 0U);
-  CHECK_LE(resolution, kMaxMaskResolution);
-  const SphereGrid grid(resolution);
-  Painter painter(state_->scene, state_->tree, grid, segment);
+  Painter painter(state_->scene, state_->tree, state_->grid, segment);
   return painter.paint_all(checkpoint).open_pixels();
 }
 

@@ -16,8 +16,9 @@ namespace weft::transport {
 // Immutable: any thread may call.
 class VisibilityRaster {
  public:
-  // Keeps a reference to `scene`, which must outlive it.
-  explicit VisibilityRaster(const Scene& scene);
+  // Of images of resolution^2 pixels. Keeps a reference to `scene`, which must outlive it.
+  // REQUIRES: resolution is a multiple of 8, at most 1024.
+  VisibilityRaster(const Scene& scene, std::uint32_t resolution);
   ~VisibilityRaster();
   VisibilityRaster(const VisibilityRaster&) = delete;
   VisibilityRaster& operator=(const VisibilityRaster&) = delete;
@@ -25,8 +26,7 @@ class VisibilityRaster {
   VisibilityRaster& operator=(VisibilityRaster&&) = delete;
 
   // As visibility_bits(): resolution^2 bits, 1 where the sky is seen.
-  // REQUIRES: resolution is a multiple of 8, at most 1024.
-  [[nodiscard]] std::vector<std::uint8_t> bits(std::uint32_t segment, std::uint32_t resolution,
+  [[nodiscard]] std::vector<std::uint8_t> bits(std::uint32_t segment,
                                                const Checkpoint& checkpoint = {}) const;
 
  private:

@@ -85,9 +85,9 @@ void probe_rays(core::Hasher& hasher, const transport::Scene& scene) {
     add(hasher, hit ? hit->t_mm : -1.0f);
     hasher.number(hit ? hit->segment : 0);
   }
-  const transport::VisibilityRaster raster(scene);
+  const transport::VisibilityRaster raster(scene, 64);
   for (std::uint32_t k = 0; k < 4; ++k) {
-    const std::vector<std::uint8_t> bits = raster.bits(k, 64);
+    const std::vector<std::uint8_t> bits = raster.bits(k);
     hasher.bytes({reinterpret_cast<const char*>(bits.data()), bits.size()});
     for (const float distance : transport::signed_distance(bits, 64)) {
       add(hasher, distance);

@@ -17,7 +17,7 @@ class VisibilityBaker : public Baker {
     require_inputs(context, "visibility", 1);
     require_resolution(resolution_, "visibility");
     input_ = tile_scene(context.inputs[0]);
-    raster_ = std::make_unique<transport::VisibilityRaster>(input_->scene);
+    raster_ = std::make_unique<transport::VisibilityRaster>(input_->scene, resolution_);
   }
 
   std::string bake(std::uint64_t shard, const std::string& /*shard_input*/,
@@ -27,7 +27,7 @@ class VisibilityBaker : public Baker {
     std::uint64_t count = 0;
     for (std::uint64_t k = shard; k < input_->tile.segment_count(); k += shard_count_, ++count) {
       const std::vector<std::uint8_t> image =
-          raster_->bits(static_cast<std::uint32_t>(k), resolution_, stop_point(should_stop));
+          raster_->bits(static_cast<std::uint32_t>(k), stop_point(should_stop));
       bits.insert(bits.end(), image.begin(), image.end());
     }
     v1::Arrays arrays;
