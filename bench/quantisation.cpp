@@ -1,0 +1,139 @@
+// Wrong signs of signed distances by how many bytes a segment's coefficients have: as many
+// components in half precision, or more of them in integers, each component with a step of its own.
+// Prints the table of docs/performance.md.
+//   cmake --build build --target bench_quantisation
+//   build/bin/bench_quantisation examples/satin_4_1.textproto ... [--paper]
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "core/half.h"
+#include "core/random.h"
+#include "fabric/build.h"
+#include "fabric/description.h"
+#include "transport/distance_fit.h"
+#include "transport/pca.h"
+#include "transport/signed_distance.h"
+#include "transport/visibility.h"
+#include "transport/visibility_raster.h"
+
+namespace weft::bench {
+namespace {
+
+constexpr std::uint32_t kResolution = 128;
+constexpr std::uint32_t kPixels = kResolution * kResolution;
+constexpr std::size_t kHeldOut = 400;
+constexpr std::size_t kSample = 1024;
+
+struct Layout {
+  std::uint32_t components;
+  int bits;  // of a coefficient; 16: a half
+};
+constexpr Layout kLayouts[] = {{48, 16}, {64, 12}, {96, 8},  {128, 6},
+                               {48, 8},  {96, 16}, {192, 16}};
+
+using Bits = std::vector<std::uint8_t>;
+
+// Images of segments that see neither nothing nor everything, one after the other.
+Bits varied_images(const fabric::Tile& tile, std::size_t count) {
+  const transport::Scene scene(tile);
+  const transport::VisibilityRaster raster(scene, kResolution);
+  core::Random random(11, 0);
+  Bits images;
+  while (images.size() < count * kPixels / 8) {
+    const Bits bits = raster.bits(random.below(tile.segment_count()));
+    const bool is_varied = std::any_of(bits.begin(), bits.end(),
+                                       [&](std::uint8_t byte) { return byte != bits.front(); });
+    if (is_varied) {
+      images.insert(images.end(), bits.begin(), bits.end());
+    }
+  }
+  return images;
+}
+
+std::vector<float> distances_of(const Bits& images) {
+  std::vector<float> all;
+  all.reserve(images.size() * 8);
+  for (std::size_t at = 0; at < images.size(); at += kPixels / 8) {
+    std::vector<float> distances =
+        transport::signed_distance(std::span(images).subspan(at, kPixels / 8), kResolution);
+    transport::correct_pixel_bias(distances, kResolution);
+    for (const float d : distances) {
+      all.push_back(std::clamp(d, -transport::kDistanceClamp, transport::kDistanceClamp));
+    }
+  }
+  return all;
+}
+
+// Each component's largest value in `sample` [images, components] is the largest integer.
+void quantise(const std::vector<float>& sample, const Layout& layout, std::vector<float>& values) {
+  const auto largest_integer = static_cast<float>((1 << (layout.bits - 1)) - 1);
+  for (std::size_t c = 0; c < layout.components; ++c) {
+    float largest = 0;
+    for (std::size_t i = c; i < sample.size(); i += layout.components) {
+      largest = std::max(largest, std::abs(sample[i]));
+    }
+    const float step = largest / largest_integer;
+    for (std::size_t i = c; i < values.size(); i += layout.components) {
+      values[i] = std::clamp(std::round(values[i] / step), -largest_integer, largest_integer) * step;
+    }
+  }
+}
+
+double wrong_share(const Bits& sample, const Bits& held_out, const Layout& layout) {
+  std::vector<float> distances = distances_of(sample);
+  const transport::DistanceBasis basis =
+      transport::principal_components(distances, kPixels, layout.components, 7);
+  const transport::DistanceFit fit(basis, kResolution);
+  std::vector<float> coefficients = fit.coefficients(held_out);
+  if (layout.bits == 16) {
+    for (float& c : coefficients) {
+      c = core::float_from_half(core::half_from_float(c));
+    }
+  } else {
+    quantise(fit.coefficients(sample), layout, coefficients);
+  }
+  return static_cast<double>(transport::wrong_signs(basis, held_out, coefficients)) /
+         static_cast<double>(8 * held_out.size());
+}
+
+void print_row(const std::string& name, const fabric::Tile& tile) {
+  const Bits images = varied_images(tile, kHeldOut + kSample);
+  const auto middle = images.begin() + static_cast<std::ptrdiff_t>(kHeldOut * kPixels / 8);
+  const Bits held_out(images.begin(), middle);
+  const Bits sample(middle, images.end());
+  fmt::print("| {} |", name);
+  for (const Layout& layout : kLayouts) {
+    fmt::print(" {:.2f} % |", 100 * wrong_share(sample, held_out, layout));
+    std::fflush(stdout);
+  }
+  fmt::print("\n");
+}
+
+}  // namespace
+}  // namespace weft::bench
+
+int main(int count, char** arguments) {
+  using namespace weft;
+  std::vector<std::string> paths(arguments + 1, arguments + count);
+  const bool paper = std::erase(paths, "--paper") > 0;
+  fmt::print("| fabric |");
+  std::string rule = "|---|";
+  for (const bench::Layout& layout : bench::kLayouts) {
+    fmt::print(" {} of {} bits, {} B |", layout.components, layout.bits,
+               layout.components * static_cast<unsigned>(layout.bits) / 8);
+    rule += "---|";
+  }
+  fmt::print("\n{}\n", rule);
+  for (const std::string& path : paths) {
+    bench::print_row(std::filesystem::path(path).stem().string(),
+                     fabric::build_tile(fabric::load_description(
+                         path, paper ? v1::QUALITY_PAPER : v1::QUALITY_PREVIEW)));
+  }
+  return 0;
+}
