@@ -13,6 +13,8 @@ import re
 import subprocess
 import sys
 
+from kubernetes_fields import lost_fields
+
 try:
     import yaml
     from kubernetes import client
@@ -34,22 +36,6 @@ class Answer:
 
     def __init__(self, data):
         self.data = json.dumps(data)
-
-
-def lost_fields(written, read, path=""):
-    """Fields of `written` that the API's models did not keep."""
-    if isinstance(written, dict):
-        if not isinstance(read, dict):
-            return [path]
-        return [lost for key, value in written.items()
-                for lost in (lost_fields(value, read[key], f"{path}.{key}")
-                             if key in read else [f"{path}.{key}"])]
-    if isinstance(written, list):
-        if not isinstance(read, list) or len(read) != len(written):
-            return [path]
-        return [lost for i, (a, b) in enumerate(zip(written, read))
-                for lost in lost_fields(a, b, f"{path}[{i}]")]
-    return [] if written == read else [path]
 
 
 def containers(manifest):

@@ -2,7 +2,7 @@
 # The tests that take long: tests/long.sh [SEEDS [FIRST_SEED [FUZZ_SECONDS]]]
 # Simulated clusters (default: 10000 seeds from 1001 on), real processes that are killed again and
 # again and every flip of a byte (WEFT_LONG=1), packages, services and containers in a fresh Debian (mmdebstrap),
-# and fuzzing (default: 600 s for each target; 0: none).
+# manifests in an API server of Kubernetes, and fuzzing (default: 600 s for each target; 0: none).
 # Wants a built tree (tests/run.sh --build-only). Prints the time that each part took.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -61,6 +61,7 @@ if has_all buildah podman crun mmdebstrap; then
 else
   echo "== containers: skipped, not all of buildah, podman, crun and mmdebstrap are installed"
 fi
+part kubernetes tests/kubernetes_apiserver.sh build
 if [ "$fuzz_seconds" -gt 0 ]; then
   part fuzzing fuzz/run.sh "$fuzz_seconds"
 fi

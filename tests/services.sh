@@ -86,6 +86,7 @@ make_debian() {
   # The machine has no network: what the packages depend on is fetched before it boots.
   chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin \
     sh -c 'apt-get install --download-only /srv/packages/*.deb' >"$work/download.log" 2>&1
+  rm "$root/etc/resolv.conf"
 }
 
 install_packages() {
