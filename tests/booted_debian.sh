@@ -71,9 +71,16 @@ stop_debian() {
 
 # For whoever cleans up, after whatever happened.
 end_debian() {
-  [ -n "${booted_by:-}" ] && kill -KILL "$booted_by" "${booted:-}" 2>/dev/null && wait "$booted_by" 2>/dev/null
-  if [ -n "${booted_groups:-}" ]; then
-    find "$booted_groups" -depth -type d -exec rmdir {} + 2>/dev/null
+  local tries
+  if [ -n "${booted_by:-}" ]; then
+    kill -KILL "$booted_by" ${booted:+"$booted"} 2>/dev/null || true
+    wait "$booted_by" 2>/dev/null || true
   fi
-  true
+  [ -n "${booted_groups:-}" ] || return 0
+  # Its processes end a moment after the first of them.
+  for ((tries = 0; tries < 50; ++tries)); do
+    find "$booted_groups" -depth -type d -exec rmdir {} + 2>/dev/null || true
+    [ -d "$booted_groups" ] || return 0
+    sleep 0.1
+  done
 }

@@ -28,12 +28,16 @@ clean_up() {
   fi
   podman rm --all --force >/dev/null 2>&1 || true
   umount "$work/storage/overlay" 2>/dev/null || true
+  umount /dev/null 2>/dev/null || true
   rm -rf "$work"
 }
 trap clean_up EXIT
 
 # The engines of this machine as they are, but for where they keep things and what they may not do
 # here: no network of their own, no control groups, which a machine without systemd shares out oddly.
+# A container's stdin becomes its user's: so it is not this machine's /dev/null.
+mknod -m 666 "$work/null" c 1 3
+mount --bind "$work/null" /dev/null
 umount -R /sys/fs/cgroup 2>/dev/null || true
 mount -t cgroup2 none /sys/fs/cgroup
 cat >"$work/storage.conf" <<CONF
