@@ -34,8 +34,7 @@ struct Layout {
   std::uint32_t components;
   int bits;  // of a coefficient; 16: a half
 };
-constexpr Layout kLayouts[] = {{48, 16}, {64, 12}, {96, 8},  {128, 6},
-                               {48, 8},  {96, 16}, {192, 16}};
+constexpr Layout kLayouts[] = {{48, 16}, {64, 12}, {96, 8}, {128, 6}, {48, 8}, {96, 16}, {192, 16}};
 
 using Bits = std::vector<std::uint8_t>;
 
@@ -80,7 +79,8 @@ void quantise(const std::vector<float>& sample, const Layout& layout, std::vecto
     }
     const float step = largest / largest_integer;
     for (std::size_t i = c; i < values.size(); i += layout.components) {
-      values[i] = std::clamp(std::round(values[i] / step), -largest_integer, largest_integer) * step;
+      values[i] =
+          std::clamp(std::round(values[i] / step), -largest_integer, largest_integer) * step;
     }
   }
 }

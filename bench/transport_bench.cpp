@@ -59,18 +59,28 @@ const transport::Scene& scene() {
   return built;
 }
 
-// Runs a kernel and sets its multiply-adds against those that the thread could do at best.
+// What a kernel does each time.
+struct Work {
+  double multiply_adds = 0;
+  double read_bytes = 0;  // of its inputs, each as often as it is gone through
+};
+
+// Runs a kernel and sets what it does against what the thread could do at best: multiply-adds, and
+// reading from memory, whether its inputs come from there or lie in a cache.
 template <class Kernel>
-void measure(benchmark::State& state, double multiply_adds, const Kernel& kernel) {
-  const double limit = bench::machine_limits().multiply_adds_per_s;
+void measure(benchmark::State& state, const Work& work, const Kernel& kernel) {
+  const bench::MachineLimits& limits = bench::machine_limits();
   const double cpu_before = core::thread_cpu_seconds();
   for (auto unused : state) {
     kernel();
   }
   const double seconds = core::thread_cpu_seconds() - cpu_before;
-  const double rate = multiply_adds * static_cast<double>(state.iterations()) / seconds;
-  state.counters["multiply_adds_per_s"] = rate;
-  state.counters["share_of_limit"] = rate / limit;
+  const double times_per_s = static_cast<double>(state.iterations()) / seconds;
+  state.counters["multiply_adds_per_s"] = work.multiply_adds * times_per_s;
+  state.counters["share_of_multiply_adds"] =
+      work.multiply_adds * times_per_s / limits.multiply_adds_per_s;
+  state.counters["read_bytes_per_s"] = work.read_bytes * times_per_s;
+  state.counters["share_of_memory"] = work.read_bytes * times_per_s / limits.read_bytes_per_s;
 }
 
 std::uint32_t some_segment(std::uint64_t i) {
@@ -146,8 +156,10 @@ void pca(benchmark::State& state) {
       sample[n * kPixels + p] = (random.uniform() - 0.5f) / (1 + 0.01f * static_cast<float>(p));
     }
   }
-  // 64 columns to and fro in three iterations, and once more at the end.
-  measure(state, 7.0 * 64 * kPixels * static_cast<double>(count), [&] {
+  // 64 columns to and fro in three iterations, and once more at the end; the mean is taken off
+  // before.
+  const auto values = static_cast<double>(sample.size());
+  measure(state, {7.0 * 64 * values, 9.0 * sizeof(float) * values}, [&] {
     benchmark::DoNotOptimize(transport::principal_components(sample, kPixels, 48, 1));
   });
 }
@@ -168,7 +180,9 @@ void normal_equations(benchmark::State& state) {
   std::vector<float> matrix(kWidth * kWidth);
   std::vector<float> vector(kWidth);
   const bool is_wide = transport::wide_is_available();
-  measure(state, kRows * kWidth * ((kWidth + 1) / 2.0 + 1), [&] {
+  const Work work{kRows * kWidth * ((kWidth + 1) / 2.0 + 1),
+                  static_cast<double>(sizeof(float) * (a.size() + b.size()))};
+  measure(state, work, [&] {
     transport::form_normal_equations(a, b, kRows, is_wide, matrix, vector);
     benchmark::DoNotOptimize(matrix.data());
   });
@@ -187,7 +201,8 @@ void transfer_sums_of_256(benchmark::State& state) {
     directions.push_back(
         glm::normalize(glm::vec3(random.uniform(), random.uniform(), random.uniform()) - 0.5F));
   }
-  measure(state, 2.0 * static_cast<double>(chunk.size()) * kPaths, [&] {
+  const auto size = static_cast<double>(chunk.size());
+  measure(state, {2.0 * size * kPaths, 2.0 * size * sizeof(std::int64_t)}, [&] {
     for (std::size_t i = 0; i < kPaths; ++i) {
       const transport::LightSample light{{0.5F, 0.4F, 0.3F}, directions[i]};
       chunk.add(directions[i + 1], {&light, 1});
