@@ -61,29 +61,43 @@ struct LobeSh {
   ShDouble schlick{};
 };
 
-// exp(-kappa (1 + cos phi)), normalised over the trapezoid rule's own points, which is exact for a
-// periodic function; kappa = 0 is the uniform density of reflection.
-std::vector<double> azimuth_weights(double kappa) {
+// Points around the fibre, and weights by which their sum is the mean over an azimuthal density of
+// what harmonics are there: a trigonometric polynomial of order kShMaxOrder.
+constexpr std::size_t kAzimuths = 2 * kShMaxOrder + 2;
+using AzimuthWeights = std::array<double, kAzimuths>;
+
+double azimuth(std::size_t k, std::size_t count) {
+  return 2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(count);
+}
+
+// Of the density exp(-kappa (1 + cos phi)), normalised; kappa = 0 is the uniform one of reflection.
+AzimuthWeights azimuth_weights(double kappa) {
   const double gamma = kappa > 0 ? 1 / std::sqrt(kappa) : 1e9;
   const int least = 2 * (kShMaxOrder + static_cast<int>(std::ceil(8 / gamma)));
-  std::vector<double> weights(static_cast<std::size_t>(std::max(32, least)));
-  double sum = 0;
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    const double phi =
-        2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(weights.size());
-    weights[k] = std::exp(-kappa * (1 + std::cos(phi)));
-    sum += weights[k];
+  const auto count = static_cast<std::size_t>(std::max(32, least));
+  // Its mean cosines of m phi, by the trapezoid rule, which is exact for a periodic function.
+  std::array<double, kShMaxOrder + 1> cosines{};
+  for (std::size_t k = 0; k < count; ++k) {
+    const double phi = azimuth(k, count);
+    const double density = std::exp(-kappa * (1 + std::cos(phi)));
+    for (std::size_t m = 0; m < cosines.size(); ++m) {
+      cosines[m] += density * std::cos(static_cast<double>(m) * phi);
+    }
   }
-  for (double& w : weights) {
-    w /= sum;
+  AzimuthWeights weights{};
+  for (std::size_t k = 0; k < kAzimuths; ++k) {
+    weights[k] = 1.0 / kAzimuths;
+    for (std::size_t m = 1; m < cosines.size(); ++m) {
+      weights[k] += 2.0 / kAzimuths * cosines[m] / cosines[0] *
+                    std::cos(static_cast<double>(m) * azimuth(k, kAzimuths));
+    }
   }
   return weights;
 }
 
-LobeSh lobe_sh(double theta_o, const LobeNormalisation& norm, double kappa) {
+LobeSh lobe_sh(double theta_o, const LobeNormalisation& norm, const AzimuthWeights& azimuths) {
   const double beta = norm.beta();
   static const QuadratureRule rule = gauss_legendre(48);
-  const std::vector<double> azimuth = azimuth_weights(kappa);
   const double low = std::max(-kHalfPiExact, -theta_o - 9 * beta);
   const double high = std::min(kHalfPiExact, -theta_o + 9 * beta);
   LobeSh sum;
@@ -95,13 +109,12 @@ LobeSh lobe_sh(double theta_o, const LobeNormalisation& norm, double kappa) {
         std::exp(-0.5 * d * d) / (std::sqrt(2 * std::numbers::pi) * beta) / norm(theta);
     const double weight = rule.weights[n] * 0.5 * (high - low) * m * c * c;
     const double schlick = weight * std::pow(1 - c, 5);
-    for (std::size_t k = 0; k < azimuth.size(); ++k) {
-      const double phi =
-          2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(azimuth.size());
+    for (std::size_t k = 0; k < kAzimuths; ++k) {
+      const double phi = azimuth(k, kAzimuths);
       const ShDouble y = evaluate_sh(std::sin(theta), c * std::cos(phi), c * std::sin(phi));
       for (std::size_t j = 0; j < y.size(); ++j) {
-        sum.plain[j] += y[j] * weight * azimuth[k];
-        sum.schlick[j] += y[j] * schlick * azimuth[k];
+        sum.plain[j] += y[j] * weight * azimuths[k];
+        sum.schlick[j] += y[j] * schlick * azimuths[k];
       }
     }
   }
@@ -120,15 +133,18 @@ struct Lobes {
   explicit Lobes(const FibreMaterial& material)
       : r(material.beta_r),
         tt(material.beta_tt),
-        kappa_tt(1 / (static_cast<double>(material.gamma_tt) * material.gamma_tt)) {}
+        azimuths_r(azimuth_weights(0)),
+        azimuths_tt(
+            azimuth_weights(1 / (static_cast<double>(material.gamma_tt) * material.gamma_tt))) {}
   LobeNormalisation r;
   LobeNormalisation tt;
-  double kappa_tt;
+  AzimuthWeights azimuths_r;
+  AzimuthWeights azimuths_tt;
 };
 
 BcsdfSh bcsdf_sh(const FibreMaterial& material, const Lobes& lobes, double theta_o) {
-  const LobeSh r = lobe_sh(theta_o, lobes.r, 0);
-  const LobeSh tt = lobe_sh(theta_o, lobes.tt, lobes.kappa_tt);
+  const LobeSh r = lobe_sh(theta_o, lobes.r, lobes.azimuths_r);
+  const LobeSh tt = lobe_sh(theta_o, lobes.tt, lobes.azimuths_tt);
   BcsdfSh out;
   for (int channel = 0; channel < 3; ++channel) {
     const double c_r = material.c_r[channel];
