@@ -4,10 +4,10 @@
 
 #include <google/protobuf/util/json_util.h>
 
-#include "cli/carried_over.h"
 #include "cli/client.h"
 #include "cli/fabric_reference.h"
 #include "client/fetch_version.h"
+#include "coordinator/versions/carried_over.h"
 #include "core/error.h"
 #include "fabric/description.h"
 
@@ -64,7 +64,7 @@ std::optional<ColourwaySource> base_of(const ColourwaySource& source,
   if (text.empty()) {
     return std::nullopt;
   }
-  const CarriedOver carried = parse_carried_over(text);
+  const coordinator::CarriedOver carried = coordinator::parse_carried_over(text);
   const std::string how = source.reference + " is a colourway itself, of " + carried.base;
   if (!parse_reference(carried.base)) {
     throw core::Error(core::Code::kFailedPrecondition,

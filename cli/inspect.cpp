@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/add_command.h"
-#include "cli/carried_over.h"
 #include "cli/commands.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
+#include "coordinator/versions/carried_over.h"
 #include "storage/database_summary.h"
 #include "storage/fabric_database.h"
 #include "storage/recolouring.h"
@@ -74,7 +74,8 @@ Json carried_over_of(const storage::Recolouring& recolouring) {
   if (recolouring.carried_over_json.empty()) {
     return nullptr;
   }
-  const CarriedOver carried = parse_carried_over(recolouring.carried_over_json);
+  const coordinator::CarriedOver carried =
+      coordinator::parse_carried_over(recolouring.carried_over_json);
   return {{"base", carried.base},
           {"base_digest", carried.base_digest},
           {"light_error", carried.light_error},

@@ -62,13 +62,11 @@ void run(const LogOptions& options) {
   for (const v1::HistoryEntry& entry : response.entries()) {
     const v1::Version& version = versions[entry.number()];
     const bool is_publication = entry.action() == "published";
-    const std::uint64_t shards = version.cached_shards() + version.computed_shards();
     table.add({time_text(entry.at_ms()), words_of(entry),
                fmt::format("{}@{}", options.fabric, entry.number()),
                is_publication ? format_bytes(version.size_bytes()) : "",
                is_publication ? format_bytes(version.shared_bytes()) : "",
-               is_publication ? fmt::format("{}/{}", version.cached_shards(), shards) : "",
-               entry.user(), entry.comment()});
+               is_publication ? reused_text(version) : "", entry.user(), entry.comment()});
   }
   fmt::print("{}", table.text());
 }

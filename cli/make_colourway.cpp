@@ -10,10 +10,10 @@
 #include <glm/common.hpp>
 #include <google/protobuf/util/json_util.h>
 
-#include "cli/carried_over.h"
 #include "cli/colour_text.h"
 #include "cli/order_levels.h"
 #include "cli/traced_difference.h"
+#include "coordinator/versions/carried_over.h"
 #include "core/check.h"
 #include "core/error.h"
 #include "shading/colour_space.h"
@@ -198,6 +198,7 @@ CarriedColourway carry_colourway(const ColourwayModel& model, const ColourwayReq
       difference.emplace(made.contents.database, sums, bcsdfs_of(made.fit.materials), model.tracer);
     }
     difference->mend(made.contents.database, sums);
+    storage::round_as_written(made.contents.database);  // what is measured is what is kept
     measure_fit(model, request, made.contents.database, made.fit, correction);
     if (made.fit.worst_delta_e() < kGoodDeltaE) {
       break;
@@ -205,7 +206,7 @@ CarriedColourway carry_colourway(const ColourwayModel& model, const ColourwayReq
   }
   check_reached(request, made.fit);
   made.error = check_carried(made.contents.database, bcsdfs_of(made.fit.materials), model.tracer);
-  made.contents.recolouring.carried_over_json = carried_over_json(
+  made.contents.recolouring.carried_over_json = coordinator::carried_over_json(
       {base_name(model.base), model.base.digest.hex(), significant(made.error.light),
        significant(made.error.light_noise), significant(made.error.matrix)});
   return made;

@@ -68,6 +68,13 @@ std::string short_digest(const std::string& binary_digest) {
   return hex(binary_digest).substr(0, kShortDigits);
 }
 
+std::string reused_text(const v1::Version& version) {
+  return version.carried_over_from().empty()
+             ? fmt::format("{}/{}", version.cached_shards(),
+                           version.cached_shards() + version.computed_shards())
+             : "light of " + version.carried_over_from();
+}
+
 std::string audits_text(const v1::Job& job) {
   const std::uint64_t count = job.audits_given_up();
   return count == 0 ? ""

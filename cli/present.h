@@ -27,6 +27,10 @@ using client::reference_text;  // "silk@3"
 // The first 12 hexadecimal digits.
 [[nodiscard]] std::string short_digest(const std::string& binary_digest);
 
+// How many of the results that it was made from had been computed before, "12/151"; "light of
+// silk@1" where it has none of its own.
+[[nodiscard]] std::string reused_text(const v1::Version& version);
+
 // Shards done and in all of the stages that are known, "512/1024".
 // That audits were given up, in words; empty when none was.
 [[nodiscard]] std::string audits_text(const v1::Job& job);

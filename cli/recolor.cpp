@@ -2,19 +2,20 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "cli/add_command.h"
 #include "cli/client.h"
-#include "cli/colour_text.h"
 #include "cli/colourway_source.h"
 #include "cli/fabric_reference.h"
 #include "cli/follow_job.h"
@@ -23,29 +24,28 @@
 #include "cli/output_file.h"
 #include "cli/present.h"
 #include "cli/print_json.h"
+#include "cli/recolor_report.h"
 #include "cli/split_materials.h"
 #include "client/fetch_version.h"
+#include "client/publish_colourway.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/interrupt.h"
 #include "proto/limits.h"
 #include "proto/names.h"
-#include "shading/colour_space.h"
 
 namespace weft::cli {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr const char* kHelp =
     "The same cloth in other colours.\n"
     "FABRIC is a database (.h5) or a published version (silk, silk@3). Geometry and visibility "
     "are\n"
-    "reused. With -o, light is carried over from the paths that were traced, in seconds, into "
-    "that\n"
-    "file. Of a published version without -o, or with --exact, it is traced anew: into a new\n"
-    "version with the coordinator, or, of a file, into -o.\n"
+    "reused, and light is carried over from the paths that were traced, in seconds: into the file\n"
+    "-o, or, of a published version without -o, into a new version with the coordinator, which\n"
+    "says so. With --exact light is traced anew: of a published version into a new one, of a file\n"
+    "into -o.\n"
     "A YARN is the name of one, 'warp', 'weft' or 'all'. A COLOUR is #7a1f2b (sRGB),\n"
     "linear:0.195,0.014,0.024 or lab:27.2,38.1,17.5 (D65): what the yarn shows on average, where "
     "a\n"
@@ -71,21 +71,22 @@ struct RecolorOptions {
   bool wants_json = false;
 };
 
-// What was made, as far as it was.
-struct Recolored {
-  ColourFit fit;
-  std::optional<CarryError> error;  // of light that was carried over
-  std::string version;              // that was published
-  std::string digest;               // of the contents; empty in a dry run
-};
+// What is kept with a version for people.
+std::string comment_of(const RecolorOptions& options, const ColourwayRequest& request) {
+  std::string comment = "colourway of " + request.source->reference + ":";
+  for (const std::string& yarn : options.yarns) {
+    comment += " " + yarn;
+  }
+  return comment.substr(0, v1::kCommentLimitBytes);
+}
 
-v1::Job publish(const v1::FabricDescription& description, const std::string& comment,
-                Client& connection) {
+v1::Job submit(const v1::FabricDescription& description, const std::string& comment,
+               Client& connection) {
   Interruption interruption(kFollowInterrupts);
   v1::SubmitRequest request;
   request.set_request_id(new_request_id());
   *request.mutable_description() = description;
-  request.mutable_options()->set_comment(comment.substr(0, v1::kCommentLimitBytes));
+  request.mutable_options()->set_comment(comment);
   v1::Job job = connection
                     .call_repeatedly(connection.jobs(), &v1::JobService::Stub::Submit, request,
                                      "submit " + description.name())
@@ -105,11 +106,7 @@ std::filesystem::path trace(const RecolorOptions& options, const ColourwayModel&
                             const v1::FabricDescription& description, Recolored& made) {
   if (request.source->is_published) {
     Client connection(options.coordinator);
-    std::string comment = "colourway of " + request.source->reference + ":";
-    for (const std::string& yarn : options.yarns) {
-      comment += " " + yarn;
-    }
-    const v1::Job job = publish(description, comment, connection);
+    const v1::Job job = submit(description, comment_of(options, request), connection);
     made.version = client::reference_text(job.version());
     made.digest = client::version_digest(job.version()).hex();
     if (!options.output.empty()) {
@@ -142,6 +139,7 @@ Recolored make_exactly(const RecolorOptions& options, const ColourwayModel& mode
                        const ColourwayRequest& request) {
   constexpr int kMostRounds = 3;
   Recolored made;
+  made.is_exact = true;
   const coordinator::OrderLevels levels = levels_of_fit(model, request);
   std::vector<glm::dvec3> correction(request.targets.size(), glm::dvec3(1));
   for (int round = 0;; ++round) {
@@ -150,6 +148,7 @@ Recolored make_exactly(const RecolorOptions& options, const ColourwayModel& mode
     if (options.is_dry_run) {
       return made;
     }
+    made.output = options.output;
     const std::filesystem::path path =
         trace(options, model, request, recolored_description(request, made.fit), made);
     measure_fit(model, request,
@@ -171,99 +170,64 @@ Recolored make_exactly(const RecolorOptions& options, const ColourwayModel& mode
   return made;
 }
 
+// A file of this process' own, gone when this is.
+class PassingFile {
+ public:
+  PassingFile() {
+    std::string folder = (std::filesystem::temp_directory_path() / "weft-recolor-XXXXXX").string();
+    if (::mkdtemp(folder.data()) == nullptr) {
+      throw core::Error(core::Code::kUnavailable,
+                        "cannot make a folder in " +
+                            std::filesystem::temp_directory_path().string() +
+                            "; name one that can be written in TMPDIR");
+    }
+    folder_ = folder;
+  }
+  ~PassingFile() {
+    std::error_code ignored;  // a file left over does no harm
+    std::filesystem::remove_all(folder_, ignored);
+  }
+  PassingFile(const PassingFile&) = delete;
+  PassingFile& operator=(const PassingFile&) = delete;
+  PassingFile(PassingFile&&) = delete;
+  PassingFile& operator=(PassingFile&&) = delete;
+
+  [[nodiscard]] std::filesystem::path path() const { return folder_ / "colourway.h5"; }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+// Into a file, or else into a version of the coordinator that has the base.
 Recolored make_carried(const RecolorOptions& options, const ColourwayModel& model,
                        const ColourwayRequest& request) {
   CarriedColourway carried = carry_colourway(model, request);
   Recolored made;
   made.fit = std::move(carried.fit);
   made.error = carried.error;
-  if (!options.is_dry_run) {
-    made.digest = storage::write_database(carried.contents.database, carried.contents.recolouring,
-                                          options.output)
-                      .hex();
+  if (options.is_dry_run) {
+    return made;
   }
+  const auto write = [&carried](const std::filesystem::path& path) {
+    return storage::write_database(carried.contents.database, carried.contents.recolouring, path);
+  };
+  if (!options.output.empty()) {
+    made.output = options.output;
+    made.digest = write(options.output).hex();
+    return made;
+  }
+  const PassingFile file;
+  const core::Digest digest = write(file.path());
+  Client connection(options.coordinator);
+  const v1::Version version = client::publish_colourway(
+      connection,
+      {file.path(), digest, request.name, model.base.reference, comment_of(options, request)});
+  made.version = client::reference_text(version);
+  made.digest = client::version_digest(version).hex();
   return made;
 }
 
-Json colour_json(glm::dvec3 linear) {
-  const glm::dvec3 lab = shading::lab_from_linear(linear);
-  return {{"hex", hex_text(linear)},
-          {"linear", {linear.x, linear.y, linear.z}},
-          {"lab", {lab.x, lab.y, lab.z}}};
-}
-
-Json to_json(const Recolored& made, const ColourwayRequest& request, const std::string& base,
-             const RecolorOptions& options, double seconds) {
-  const std::vector<std::string>& names = request.source->contents.database.material_names;
-  Json targets = Json::array();
-  for (std::size_t t = 0; t < request.targets.size(); ++t) {
-    const YarnTarget& target = request.targets[t];
-    Json materials = Json::array();
-    for (const std::size_t m : target.materials) {
-      const shading::FibreMaterial& material = made.fit.materials[m];
-      materials.push_back({{"name", names[m]},
-                           {"c_r", {material.c_r.x, material.c_r.y, material.c_r.z}},
-                           {"c_tt", {material.c_tt.x, material.c_tt.y, material.c_tt.z}}});
-    }
-    targets.push_back({{"yarns", target.label},
-                       {"asked", colour_json(target.linear)},
-                       {"shown", colour_json(made.fit.reached[t])},
-                       {"delta_e_2000", made.fit.delta_e[t]},
-                       {"materials", materials}});
-  }
-  Json json{{"fabric", request.name},
-            {"of", request.source->reference},
-            {"exact", options.is_exact},
-            {"output", nullptr},
-            {"version", nullptr},
-            {"content_digest", nullptr},
-            {"targets", targets},
-            {"carried_over", nullptr},
-            {"exposure", request.exposure},
-            {"pictures", made.fit.pictures},
-            {"seconds", seconds}};
-  if (!options.output.empty() && !options.is_dry_run) {
-    json["output"] = options.output;
-  }
-  if (!made.version.empty()) {
-    json["version"] = made.version;
-  }
-  if (!made.digest.empty()) {
-    json["content_digest"] = made.digest;
-  }
-  if (made.error) {
-    json["carried_over"] = {{"from", base},
-                            {"light_error", made.error->light},
-                            {"light_error_noise", made.error->light_noise},
-                            {"matrix_error", made.error->matrix},
-                            {"cells_compared", made.error->cells}};
-  }
-  return json;
-}
-
-void print_text(const Recolored& made, const ColourwayRequest& request, const std::string& base,
-                const RecolorOptions& options, double seconds) {
-  fmt::print("measured where a white diffuser shows {:.3g}\n", request.exposure);
-  for (std::size_t t = 0; t < request.targets.size(); ++t) {
-    fmt::print("{}: asked {}, shows {}, Delta E 2000 {:.2f}\n", request.targets[t].label,
-               hex_text(request.targets[t].linear), hex_text(made.fit.reached[t]),
-               made.fit.delta_e[t]);
-  }
-  if (made.error) {
-    fmt::print("light carried over from {}: off by {:.1f} % (+- {:.1f} %), matrices by {:.1f} %\n",
-               base, 100 * made.error->light, 100 * made.error->light_noise,
-               100 * made.error->matrix);
-  }
-  const std::string what = options.is_dry_run       ? "nothing was written"
-                           : options.output.empty() ? made.version
-                           : made.version.empty()
-                               ? options.output
-                               : fmt::format("{}, {}", made.version, options.output);
-  const std::string content = made.digest.empty() ? "" : ", content " + made.digest.substr(0, 12);
-  fmt::print("{}{}, in {}\n", what, content, format_duration(seconds));
-}
-
-void run(RecolorOptions options) {
+void run(const RecolorOptions& options) {
   if (!options.name.empty() && !v1::is_fabric_name(options.name)) {
     throw core::Error(
         core::Code::kInvalidArgument,
@@ -274,17 +238,8 @@ void run(RecolorOptions options) {
   }
   const core::Stopwatch since_start;
   ColourwaySource source = open_colourway_source(options.fabric, options.coordinator);
-  if (options.output.empty() && !options.is_dry_run) {
-    if (!source.is_published) {
-      throw CLI::RequiredError("--output");
-    }
-    if (!options.is_exact) {
-      fmt::print(
-          stderr,
-          "the light is traced for a new version; -o FILE.h5 has it carried over in seconds, "
-          "for a file\n");
-      options.is_exact = true;
-    }
+  if (options.output.empty() && !options.is_dry_run && !source.is_published) {
+    throw CLI::RequiredError("--output");
   }
   const unsigned threads =
       options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
@@ -309,9 +264,9 @@ void run(RecolorOptions options) {
                                           : make_carried(options, model, request);
   const double seconds = since_start.seconds();
   if (options.wants_json) {
-    print_json(to_json(made, request, model.base.reference, options, seconds));
+    print_json(to_json(made, request, model.base.reference, seconds));
   } else {
-    print_text(made, request, model.base.reference, options, seconds);
+    print_text(made, request, model.base.reference, seconds);
   }
 }
 

@@ -17,7 +17,9 @@ namespace {
 constexpr const char* kHelp =
     "List the published versions of a fabric, newest first.\n"
     "Equal CONTENT means equal files. SHARED is how much of the file was on the disk before, and\n"
-    "REUSED how many of the results it was made from had been computed before.\n"
+    "REUSED how many of the results it was made from had been computed before, or the version "
+    "from\n"
+    "which 'weft recolor' carried its light over.\n"
     "Example: weft versions silk";
 
 struct VersionsOptions {
@@ -49,11 +51,9 @@ void run(const VersionsOptions& options) {
   Table table({"VERSION", "TAGS", "CONTENT", "SIZE", "SHARED", "REUSED", "PUBLISHED", "USER", "JOB",
                "COMMENT"});
   for (const v1::Version& version : response.versions()) {
-    const std::uint64_t shards = version.cached_shards() + version.computed_shards();
     table.add({reference_text(version), tags_text(version, version.number() == latest),
                short_digest(version.content_digest()), format_bytes(version.size_bytes()),
-               format_bytes(version.shared_bytes()),
-               fmt::format("{}/{}", version.cached_shards(), shards),
+               format_bytes(version.shared_bytes()), reused_text(version),
                time_text(version.published_at_ms()), version.user(), version.job_id(),
                version.comment()});
   }

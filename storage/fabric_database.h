@@ -72,6 +72,10 @@ struct FabricDatabase {
 // core::Error(kDataLoss) naming the dataset when the contents contradict each other.
 core::Digest write_database(const FabricDatabase& database, const std::filesystem::path& path);
 
+// Rounds the light of `database` as write_database does, so that what is read from its file is what
+// it is, and writing that again gives the same bytes.
+void round_as_written(FabricDatabase& database);
+
 // Reads schema 1 with limits, after checking the digest: throws core::Error(kDataLoss) naming the
 // dataset on any damage, on links, external storage, virtual datasets, foreign filters, shapes
 // larger than the file can hold, counts that contradict each other, indices out of range and

@@ -166,12 +166,53 @@ TEST_F(RecolorTest, OfAPublishedVersion_LightIsCarriedIntoAFile) {
   EXPECT_TRUE(base->contents.recolouring.has_orders());
 }
 
+TEST_F(RecolorTest, OfAPublishedVersion_ACarriedOverOneIsPublished) {
+  const TestFolder folder;
+  const std::string file = folder / "claret.h5";
+  const std::string fetched = folder / "fetched.h5";
+  const std::vector<std::string> claret{"recolor", "tiny", "--yarn", "warp=#7a1f2b"};
+  const auto with = [&claret](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = claret;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  {
+    const TestCluster cluster(folder, "kept", 1);
+    const std::string description = write_description(folder, "512");
+    ASSERT_EQ(cluster.weft({"submit", description, "--wait", "--quality", "preview"}).code, 0);
+    ASSERT_EQ(cluster.weft(with({"-o", file})).code, 0);
+    const Finished made = cluster.weft(with({"--json"}));
+    ASSERT_EQ(made.code, 0) << made.err;
+    EXPECT_EQ(made.json()["version"], "tiny@2");
+    EXPECT_TRUE(made.json()["output"].is_null());
+    EXPECT_EQ(made.json()["carried_over"]["from"], "tiny@1");
+    EXPECT_LT(made.json()["targets"][0]["delta_e_2000"].get<double>(), 1);
+    EXPECT_EQ(made.json()["content_digest"], storage::content_digest(file).hex());
+  }
+  // Another process on the same folder has it, and says what it is.
+  const TestCluster cluster(folder, "kept", 0);
+  ASSERT_EQ(cluster.weft({"fetch", "tiny@2", "-o", fetched}).code, 0);
+  EXPECT_EQ(core::read_file(fetched), core::read_file(file));
+  EXPECT_THAT(cluster.weft({"versions", "tiny"}).out, HasSubstr("light of tiny@1"));
+  EXPECT_THAT(cluster.weft({"log", "tiny"}).out, HasSubstr("colourway of tiny@1: warp=#7a1f2b"));
+  EXPECT_EQ(cluster.weft({"versions", "tiny", "--json"}).json()[0]["carried_over_from"], "tiny@1");
+  EXPECT_EQ(cluster.weft({"tag", "tiny@2", "claret"}).code, 0);
+  EXPECT_THAT(cluster.weft({"diff", "tiny@1", "tiny:claret"}).out, HasSubstr("/iirtf/transfer"));
+  // Of the colourway: its base is found, and its other yarn keeps its colour.
+  const Finished second =
+      cluster.weft({"recolor", "tiny@2", "--yarn", "weft=#305030", "--name", "moss", "--json"});
+  ASSERT_EQ(second.code, 0) << second.err;
+  EXPECT_EQ(second.json()["version"], "moss@1");
+  EXPECT_EQ(second.json()["carried_over"]["from"], "tiny@1");
+}
+
 TEST_F(RecolorTest, OfAPublishedVersion_ANewOneIsTraced) {
   const TestFolder folder;
   const TestCluster cluster(folder, "exact", 1);
   const std::string description = write_description(folder, "512");
   ASSERT_EQ(cluster.weft({"submit", description, "--wait", "--quality", "preview"}).code, 0);
-  const Finished exact = cluster.weft({"recolor", "tiny@1", "--yarn", "warp=#7a1f2b", "--json"});
+  const Finished exact =
+      cluster.weft({"recolor", "tiny@1", "--yarn", "warp=#7a1f2b", "--exact", "--json"});
   ASSERT_EQ(exact.code, 0) << exact.err;
   EXPECT_EQ(exact.json()["exact"], true);
   EXPECT_TRUE(exact.json()["carried_over"].is_null());

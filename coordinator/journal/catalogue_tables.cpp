@@ -17,6 +17,9 @@ CREATE TABLE IF NOT EXISTS version_facts(
   shared_bytes INTEGER NOT NULL, cached_shards INTEGER NOT NULL,
   computed_shards INTEGER NOT NULL, user TEXT NOT NULL,
   PRIMARY KEY(fabric, number)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS carried_versions(
+  fabric TEXT NOT NULL, number INTEGER NOT NULL, base TEXT NOT NULL,
+  PRIMARY KEY(fabric, number)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS manifests(
   fabric TEXT NOT NULL, number INTEGER NOT NULL, pieces BLOB NOT NULL,
   PRIMARY KEY(fabric, number));
@@ -37,7 +40,8 @@ const std::string kSelectVersions =
     "SELECT v.fabric, v.number, v.content_digest, v.size_bytes, v.file, v.job, v.comment, "
     "v.published_at_ms, f.parent, f.shared_bytes, f.cached_shards, f.computed_shards, f.user, "
     "(SELECT group_concat(tag, ' ') FROM (SELECT tag FROM tags t WHERE t.fabric = v.fabric AND "
-    "t.number = v.number ORDER BY tag)) FROM versions v LEFT JOIN version_facts f ON "
+    "t.number = v.number ORDER BY tag)), (SELECT c.base FROM carried_versions c WHERE "
+    "c.fabric = v.fabric AND c.number = v.number) FROM versions v LEFT JOIN version_facts f ON "
     "f.fabric = v.fabric AND f.number = v.number ";
 
 const std::string kLatestOfFabric =
@@ -73,6 +77,7 @@ VersionRecord version_of(const Statement& s) {
   version.computed_shards = s.number_of(11);
   version.user = s.bytes_of(12);
   version.tags = words_of(s.bytes_of(13));
+  version.carried_over_from = s.bytes_of(14);
   return version;
 }
 
@@ -143,6 +148,13 @@ void write_version(Connection& connection, const VersionRecord& version) {
       .number(version.computed_shards)
       .text(version.user)
       .step();
+  if (!version.carried_over_from.empty()) {
+    Statement(connection, "INSERT INTO carried_versions(fabric, number, base) VALUES(?, ?, ?)")
+        .text(version.fabric)
+        .number(version.number)
+        .text(version.carried_over_from)
+        .step();
+  }
 }
 
 void write_pieces(Connection& connection, const std::string& fabric, std::uint64_t number,
@@ -167,7 +179,8 @@ void JournalCatalogue::create_tables(Connection& connection) { connection.run(kT
 
 void JournalCatalogue::publish(const VersionRecord& version,
                                const std::vector<storage::Piece>& pieces,
-                               const std::vector<core::Digest>& results) {
+                               const std::vector<core::Digest>& results,
+                               const std::string& request_id) {
   const std::lock_guard lock(connection_mutex_);
   Transaction transaction(connection_);
   write_version(connection_, version);
@@ -180,7 +193,7 @@ void JournalCatalogue::publish(const VersionRecord& version,
             {},
             version.user,
             version.comment,
-            {}});
+            request_id});
   Statement insert(connection_, "INSERT OR IGNORE INTO published_results(result) VALUES(?)");
   for (const core::Digest& result : results) {
     insert.blob(result.binary()).step();

@@ -30,6 +30,7 @@ struct VersionRecord {
   std::uint64_t computed_shards = 0;
   std::string user;
   std::vector<std::string> tags;  // sorted
+  std::string carried_over_from;  // "silk@3", whose light it has; empty: its own was traced
 };
 
 // One step of a fabric's history.
@@ -63,9 +64,10 @@ class JournalCatalogue {
       : connection_(connection), connection_mutex_(connection_mutex) {}
 
   // Puts a version into the catalogue, with its pieces and the results it was made from, and makes
-  // it the latest. Throws core::Error(kAlreadyExists) when that number is taken.
+  // it the latest. The step is recorded with `request_id`, which may be empty. Throws
+  // core::Error(kAlreadyExists) when that number is taken.
   void publish(const VersionRecord& version, const std::vector<storage::Piece>& pieces,
-               const std::vector<core::Digest>& results);
+               const std::vector<core::Digest>& results, const std::string& request_id);
 
   [[nodiscard]] std::vector<VersionRecord> latest_versions();  // one of each fabric, by name
   [[nodiscard]] std::vector<VersionRecord> versions(const std::string& fabric);  // newest first

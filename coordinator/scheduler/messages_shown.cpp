@@ -106,6 +106,7 @@ v1::Version message_of(const VersionRecord& version) {
   message.set_cached_shards(version.cached_shards);
   message.set_computed_shards(version.computed_shards);
   message.set_user(version.user);
+  message.set_carried_over_from(version.carried_over_from);
   return message;
 }
 

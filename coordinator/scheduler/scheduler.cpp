@@ -304,11 +304,16 @@ void Scheduler::check_limits(const std::string& user) const {
                                   " unfinished jobs, which is the limit of one user; wait for "
                                   "some, or cancel them");
   }
+  check_journal_limit();
+}
+
+void Scheduler::check_journal_limit() const {
   const std::uint64_t size = journal_.size_bytes();
   if (size >= options_.journal_limit_bytes) {
-    refuse("journal_limit_bytes", "the journal has grown to " + std::to_string(size) +
-                                      " bytes; remove results that no version needs (weft gc), or "
-                                      "raise the coordinator's limit");
+    throw core::Error(core::Code::kResourceExhausted,
+                      "journal_limit_bytes: the journal has grown to " + std::to_string(size) +
+                          " bytes; remove results that no version needs (weft gc), or raise the "
+                          "coordinator's limit");
   }
 }
 

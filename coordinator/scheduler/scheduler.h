@@ -96,6 +96,8 @@ class Scheduler {
   [[nodiscard]] std::vector<v1::Worker> workers();
   [[nodiscard]] Census census();
   [[nodiscard]] std::uint64_t journal_bytes() const { return journal_.size_bytes(); }
+  // Throws core::Error(kResourceExhausted) when the journal has grown to its limit.
+  void check_journal_limit() const;
   // Both answer with all workers of that name.
   [[nodiscard]] std::vector<v1::Worker> drain(const Order& order, bool is_drained);
   [[nodiscard]] std::vector<v1::Worker> unblock(const Order& order, const std::string& stage);

@@ -9,11 +9,10 @@
 
 namespace weft::coordinator {
 
-namespace {
-
 // Checks what any order must have.
-CatalogueOrder order_of(const std::string& request_id, const security::Caller& caller,
-                        const std::string& comment) {
+CatalogueOrder CatalogueService::order_of(const std::string& request_id,
+                                          const security::Caller& caller,
+                                          const std::string& comment) {
   check_id(request_id, "request_id");
   if (comment.size() > v1::kCommentLimitBytes) {
     throw core::Error(core::Code::kInvalidArgument, "comment is longer than 1024 bytes");
@@ -21,8 +20,6 @@ CatalogueOrder order_of(const std::string& request_id, const security::Caller& c
   const std::string user = caller.user.empty() ? "nobody" : caller.user;
   return {request_id, user, comment, to_ms(core::system_clock().now())};
 }
-
-}  // namespace
 
 grpc::Status CatalogueService::ListFabrics(grpc::ServerContext* context,
                                            const v1::ListFabricsRequest* /*request*/,

@@ -6,6 +6,7 @@
 #include "coordinator/services/open_streams.h"
 #include "proto/limits.h"
 #include "proto/weft/v1/cluster.grpc.pb.h"
+#include "security/caller.h"
 
 namespace weft::coordinator {
 
@@ -34,14 +35,23 @@ class CatalogueService final : public v1::CatalogueService::Service {
                            v1::ListHistoryResponse* response) override;
   grpc::Status DiffVersions(grpc::ServerContext* context, const v1::DiffVersionsRequest* request,
                             v1::DiffVersionsResponse* response) override;
+  grpc::Status PublishColourway(grpc::ServerContext* context,
+                                grpc::ServerReader<v1::PublishColourwayRequest>* reader,
+                                v1::PublishColourwayResponse* response) override;
   grpc::Status CollectGarbage(grpc::ServerContext* context,
                               const v1::CollectGarbageRequest* request,
                               v1::CollectGarbageResponse* response) override;
 
  private:
+  [[nodiscard]] static CatalogueOrder order_of(const std::string& request_id,
+                                               const security::Caller& caller,
+                                               const std::string& comment);
+
   Scheduler& scheduler_;
   Catalogue& catalogue_;
   OpenStreams fetches_{"fetches", v1::kFetchesLimit, v1::kFetchesPerConnectionLimit};
+  OpenStreams colourways_{"colourways", v1::kColourwaysLimit, v1::kColourwaysPerConnectionLimit};
+  std::mutex checking_;    // two databases are in memory while a colourway is held against its base
   std::mutex collecting_;  // two collectors at once would only count wrongly
 };
 

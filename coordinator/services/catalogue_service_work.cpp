@@ -1,13 +1,17 @@
+#include <spdlog/spdlog.h>
+
 #include "coordinator/scheduler/garbage.h"
 #include "coordinator/scheduler/listings.h"
 #include "coordinator/scheduler/messages.h"
 #include "coordinator/services/catalogue_service.h"
 #include "coordinator/services/rpc.h"
+#include "coordinator/versions/colourway_arrival.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "proto/limits.h"
 
-// The catalogue's calls that take a while: comparing versions, and collecting garbage.
+// The catalogue's calls that take a while: comparing versions, taking in colourways, and collecting
+// garbage.
 
 namespace weft::coordinator {
 
@@ -37,6 +41,40 @@ grpc::Status CatalogueService::DiffVersions(grpc::ServerContext* context,
                                             v1::DiffVersionsResponse* response) {
   return answer(*context, "CatalogueService.DiffVersions", [&] {
     *response = diff_versions(catalogue_, request->from(), request->to());
+    return grpc::Status::OK;
+  });
+}
+
+grpc::Status CatalogueService::PublishColourway(
+    grpc::ServerContext* context, grpc::ServerReader<v1::PublishColourwayRequest>* reader,
+    v1::PublishColourwayResponse* response) {
+  return answer(*context, "CatalogueService.PublishColourway", [&](const security::Caller& caller) {
+    const OpenStreams::Ticket ticket = colourways_.enter(*context);
+    v1::PublishColourwayRequest request;
+    if (!reader->Read(&request)) {
+      return grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "the stream has no message");
+    }
+    ColourwayClaim claim{
+        order_of(request.request_id(), caller, request.comment()), request.fabric(), request.base(),
+        digest_from(request.content_digest(), "content_digest"), request.size_bytes()};
+    if (const auto before = catalogue_.done_before(claim.order)) {
+      *response->mutable_version() = message_of(*before);
+      return grpc::Status::OK;
+    }
+    scheduler_.check_journal_limit();
+    ColourwayArrival arrival(catalogue_, std::move(claim));
+    do {
+      if (request.data().size() > v1::kChunkLimitBytes) {
+        return grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "a chunk is larger than 1 MiB");
+      }
+      arrival.add(request.data());
+    } while (reader->Read(&request));
+    const std::lock_guard one_at_a_time(checking_);
+    const VersionRecord version = arrival.publish();
+    spdlog::info("version={}@{} event=published digest={} bytes={} carried_over_from={} user={}",
+                 version.fabric, version.number, version.content_digest.hex(), version.size_bytes,
+                 version.carried_over_from, version.user);
+    *response->mutable_version() = message_of(version);
     return grpc::Status::OK;
   });
 }

@@ -95,7 +95,6 @@ std::vector<VersionRecord> Catalogue::versions(const std::string& fabric) const 
 
 std::vector<VersionRecord> Catalogue::latest_versions() const { return journal_.latest_versions(); }
 
-// What an order that was carried out before was about.
 std::optional<VersionRecord> Catalogue::done_before(const CatalogueOrder& order) const {
   const std::optional<HistoryRecord> step = journal_.step_of_request(order.request_id);
   return step ? std::optional(find(step->fabric + "@" + std::to_string(step->number)))

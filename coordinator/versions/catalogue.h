@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -31,6 +32,8 @@ struct Publication {
   std::vector<core::Digest> results;   // it was made from
   std::vector<storage::Piece> pieces;  // see Catalogue::prepare
   std::uint64_t shared_bytes = 0;
+  std::string carried_over_from;  // see VersionRecord
+  std::string request_id;         // of the call that publishes it; empty: none
 };
 
 // Who does something to the catalogue, when and why. A call that is repeated with the same
@@ -50,8 +53,8 @@ struct CatalogueOrder {
 // Any thread may call anything.
 class Catalogue {
  public:
-  // Makes pieces/, versions/ and assembled/ in `state_folder` where needed. `journal` must outlive
-  // the catalogue.
+  // Makes pieces/, versions/, assembled/ and arriving/ in `state_folder` where needed. `journal`
+  // must outlive the catalogue.
   Catalogue(Journal& journal, const std::filesystem::path& state_folder);
 
   // Makes the file of a version again, from the results that it was made from, or gives nothing
@@ -62,11 +65,17 @@ class Catalogue {
   // The long part of publishing: cuts the file and stores its pieces. Nobody sees anything of it.
   void prepare(Publication& publication);
   // Makes the next version of the fabric, and the latest. REQUIRES: prepared. When the latest
-  // version has the same content digest, or this job has published that content before, no new one
-  // is made: that version is returned, so that repeating a job, or a publication whose answer was
-  // lost, changes nothing (but a damaged piece of it is mended). Equal content of an older version
-  // does get a new number: going back is a step of its own in a fabric's history.
+  // version has the same content digest, or this job or call has published that content before, no
+  // new one is made: that version is returned, so that repeating a job, or a publication whose
+  // answer was lost, changes nothing (but a damaged piece of it is mended). Equal content of an
+  // older version does get a new number: going back is a step of its own in a fabric's history.
   VersionRecord publish(const Publication& publication);
+
+  // What an order that was carried out before was about.
+  [[nodiscard]] std::optional<VersionRecord> done_before(const CatalogueOrder& order) const;
+  // A name for a file that is to be published, of nobody else; what is left there is wiped at the
+  // next start.
+  [[nodiscard]] std::filesystem::path new_arrival();
 
   // "silk@3", "silk:approved", "silk@latest" or "silk". Throws core::Error(kInvalidArgument) when
   // it is no reference, kNotFound, saying what there is, when nothing has that name, number or tag.
@@ -106,7 +115,6 @@ class Catalogue {
   [[nodiscard]] std::set<core::Digest> published_results() const;
 
  private:
-  [[nodiscard]] std::optional<VersionRecord> done_before(const CatalogueOrder& order) const;
   [[nodiscard]] std::vector<storage::Piece> store(const std::filesystem::path& file,
                                                   std::uint64_t* shared_bytes);
   [[nodiscard]] std::vector<storage::Piece> cut_whole_file(const VersionRecord& version);
@@ -119,6 +127,8 @@ class Catalogue {
   JournalCatalogue& journal_;
   std::filesystem::path whole_files_;
   std::filesystem::path assembled_;
+  std::filesystem::path arriving_;
+  std::atomic<std::uint64_t> arrivals_{0};
   storage::BlobStore pieces_;
   Remake remake_;
   std::mutex publishing_;  // numbers are given one at a time

@@ -1,12 +1,12 @@
 #include "coordinator/versions/commit.h"
 
 #include <algorithm>
-#include <numbers>
 #include <utility>
 
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
+#include "coordinator/versions/fibre_materials.h"
 #include "coordinator/versions/result_folding.h"
 #include "core/check.h"
 #include "core/error.h"
@@ -41,15 +41,6 @@ FinishedStage take_results(Stage stage, const std::vector<StageResults>& results
                           std::to_string(stage.shard_count) + " were planned; run the job again");
   }
   return {std::move(stage), found->shards};
-}
-
-shading::FibreMaterial fibre_material(const v1::Material& material) {
-  const auto colour = [](const v1::Rgb& rgb) { return glm::vec3(rgb.r(), rgb.g(), rgb.b()); };
-  const auto radians = [](double degrees) {
-    return static_cast<float>(degrees * std::numbers::pi / 180);
-  };
-  return {colour(material.c_r()), colour(material.c_tt()), radians(material.beta_r_deg()),
-          radians(material.beta_tt_deg()), radians(material.gamma_tt_deg())};
 }
 
 // Folds a stage into `database`. Stages come in an order in which they can be planned, so those

@@ -35,10 +35,12 @@ bool is_intact(const std::filesystem::path& file, const VersionRecord& version) 
 }
 
 core::Error lost(const VersionRecord& version, const std::string& what) {
-  return {core::Code::kDataLoss,
-          text_of(version) + " is damaged in the coordinator's folder: " + what +
-              ", and the results that it was made from are not all there; submit the fabric again, "
-              "which mends it"};
+  const std::string how =
+      version.carried_over_from.empty()
+          ? "and the results that it was made from are not all there; submit the fabric again"
+          : "and its light is nowhere else; recolor " + version.carried_over_from + " again";
+  return {core::Code::kDataLoss, text_of(version) + " is damaged in the coordinator's folder: " +
+                                     what + ", " + how + ", which mends it"};
 }
 
 }  // namespace
@@ -47,11 +49,14 @@ Catalogue::Catalogue(Journal& journal, const std::filesystem::path& state_folder
     : journal_(journal.catalogue()),
       whole_files_(state_folder / "versions"),
       assembled_(state_folder / "assembled"),
+      arriving_(state_folder / "arriving"),
       pieces_(state_folder / "pieces") {
   core::make_folder(whole_files_);
   std::error_code ignored;  // what stays is found again
-  std::filesystem::remove_all(assembled_, ignored);
-  core::make_folder(assembled_);
+  for (const std::filesystem::path& folder : {assembled_, arriving_}) {
+    std::filesystem::remove_all(folder, ignored);
+    core::make_folder(folder);
+  }
   pieces_.remove_unfinished();
 }
 
@@ -72,6 +77,10 @@ std::vector<storage::Piece> Catalogue::store(const std::filesystem::path& file,
   return pieces;
 }
 
+std::filesystem::path Catalogue::new_arrival() {
+  return arriving_ / (std::to_string(++arrivals_) + ".h5");
+}
+
 void Catalogue::prepare(Publication& publication) {
   publication.shared_bytes = 0;
   publication.pieces = store(publication.file, &publication.shared_bytes);
@@ -89,12 +98,15 @@ VersionRecord Catalogue::publish(const Publication& publication) {
     }
   }
   const std::lock_guard lock(publishing_);
+  if (const auto step = journal_.step_of_request(publication.request_id)) {
+    return find(step->fabric + "@" + std::to_string(step->number));
+  }
   const std::vector<VersionRecord> versions = journal_.versions(publication.fabric);
   const std::uint64_t latest = journal_.latest_number(publication.fabric);
   std::error_code ignored;  // what stays of the file is wiped by the next start
   const auto same = std::find_if(versions.begin(), versions.end(), [&](const VersionRecord& v) {
     return v.content_digest == publication.content_digest &&
-           (v.number == latest || v.job == publication.job);
+           (v.number == latest || (!v.job.empty() && v.job == publication.job));
   });
   if (same != versions.end()) {
     std::filesystem::remove(publication.file, ignored);
@@ -117,7 +129,8 @@ VersionRecord Catalogue::publish(const Publication& publication) {
   version.cached_shards = publication.cached_shards;
   version.computed_shards = publication.computed_shards;
   version.user = publication.user;
-  journal_.publish(version, publication.pieces, publication.results);
+  version.carried_over_from = publication.carried_over_from;
+  journal_.publish(version, publication.pieces, publication.results, publication.request_id);
   std::filesystem::remove(publication.file, ignored);
   return version;
 }

@@ -56,6 +56,7 @@ export class FabricPage {
     const about = [
       bytes(num(version.size_bytes)),
       num(version.shared_bytes) ? `${percent(num(version.shared_bytes) / num(version.size_bytes))} of it was on the disk before` : null,
+      version.carried_over_from ? `its light was carried over from ${version.carried_over_from}` : null,
       computed + cached > 0 ? `${plural(computed, "shard")} computed, ${cached.toLocaleString("en")} known` : null,
     ].filter(Boolean);
     const compare = before

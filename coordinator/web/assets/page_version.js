@@ -59,8 +59,8 @@ export class VersionPage {
     const facts = [
       ["Published", `${when(num(version.published_at_ms))}${named(version.user) ? `, by ${version.user}` : ""}`],
       ["Size", `${bytes(size)}${num(version.shared_bytes) ? `, ${percent(num(version.shared_bytes) / size)} of it was on the disk before` : ""}`],
-      ["Computed", `${num(version.computed_shards).toLocaleString("en")} shards, ${num(version.cached_shards).toLocaleString("en")} were known`],
-      ["Made by", version.job_id ? el("a", { href: `#/jobs/${version.job_id}` }, version.job_id) : "an import"],
+      version.carried_over_from ? ["Light", `carried over from ${version.carried_over_from}, not traced`] : ["Computed", `${num(version.computed_shards).toLocaleString("en")} shards, ${num(version.cached_shards).toLocaleString("en")} were known`],
+      ["Made by", version.job_id ? el("a", { href: `#/jobs/${version.job_id}` }, version.job_id) : version.carried_over_from ? "weft recolor" : "an import"],
       ["Digest", el("code", {}, hex(version.content_digest, 16))],
       ["Fetch it", el("code", {}, `weft fetch ${this.fabric}@${this.number} -o ${this.fabric}.h5`)],
     ];

@@ -1,8 +1,8 @@
-#include "cli/carried_over.h"
+#include "coordinator/versions/carried_over.h"
 
 #include <nlohmann/json.hpp>
 
-namespace weft::cli {
+namespace weft::coordinator {
 
 using Json = nlohmann::ordered_json;
 
@@ -31,4 +31,4 @@ CarriedOver parse_carried_over(const std::string& json) {
           number("matrix_error")};
 }
 
-}  // namespace weft::cli
+}  // namespace weft::coordinator
