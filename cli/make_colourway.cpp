@@ -1,6 +1,8 @@
 #include "cli/make_colourway.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -32,8 +34,8 @@ void set_rgb(v1::Rgb& rgb, const glm::vec3& colour) {
   rgb.set_b(five_digits(colour.z));
 }
 
-std::vector<glm::dvec3> no_correction(const ColourwayRequest& request) {
-  return std::vector<glm::dvec3>(request.targets.size(), glm::dvec3(1));
+ColourRatios no_correction(const ColourwayRequest& request) {
+  return ColourRatios(request.targets.size(), glm::dvec3(1));
 }
 
 std::vector<shading::FibreBcsdf> bcsdfs_of(const std::vector<shading::FibreMaterial>& materials) {
@@ -113,12 +115,13 @@ coordinator::OrderLevels levels_of_fit(const ColourwayModel& model,
 }
 
 void measure_fit(const ColourwayModel& model, const ColourwayRequest& request,
-                 const storage::FabricDatabase& database, ColourFit& fit,
-                 std::vector<glm::dvec3>& correction) {
+                 const storage::FabricDatabase& database, const ColourRatios& bias, ColourFit& fit,
+                 ColourRatios& correction) {
   constexpr double kBlack = 1e-6;
-  const std::vector<glm::dvec3> shown =
+  std::vector<glm::dvec3> shown =
       target_colours(request.targets, yarn_colours(database, request.exposure, model.threads));
   for (std::size_t t = 0; t < shown.size(); ++t) {
+    shown[t] *= bias[t];
     correction[t] *= glm::max(shown[t], kBlack) / glm::max(fit.reached[t], kBlack);
     fit.reached[t] = shown[t];
     fit.delta_e[t] = shading::delta_e_2000(shading::lab_from_linear(request.targets[t].linear),
@@ -169,47 +172,71 @@ storage::RecolourableDatabase carried_contents(const ColourwayModel& model,
 }  // namespace
 
 void check_reached(const ColourwayRequest& request, const ColourFit& fit) {
+  constexpr std::uint64_t kFewPaths = 2048;  // fewer than a preview has
+  const std::vector<std::uint64_t>& paths = request.source->contents.database.cell_paths;
+  const bool has_few = *std::min_element(paths.begin(), paths.end()) < kFewPaths;
   for (std::size_t t = 0; t < request.targets.size() && !request.takes_nearest; ++t) {
     if (fit.delta_e[t] >= kPromisedDeltaE) {
       throw core::Error(
           core::Code::kInvalidArgument,
           fmt::format("yarn {} cannot show {} in this cloth: its fibres reflect from 0 to 1 of "
                       "light, and the nearest they get is {}, Delta E 2000 {:.1f}; ask for that, "
-                      "take it with --nearest, or let more light on it with --exposure",
+                      "take it with --nearest, or let more light on it with --exposure{}",
                       request.targets[t].label, hex_text(request.targets[t].linear),
-                      lightness_text(fit.reached[t]), fit.delta_e[t]));
+                      lightness_text(fit.reached[t]), fit.delta_e[t],
+                      has_few
+                          ? "; of so few paths a cell that is a rough guess, so that it may help "
+                            "to make the fabric with more (paths_per_cell)"
+                          : ""));
     }
   }
 }
 
-CarriedColourway carry_colourway(const ColourwayModel& model, const ColourwayRequest& request) {
+CarriedColourway carry_colourway(const ColourwayModel& model, const ColourwayRequest& request,
+                                 const ColourRatios& bias) {
   constexpr double kGoodDeltaE = 0.3;
+  constexpr double kFarDeltaE = 3;  // light of such dyes says little of that of others
   constexpr int kMostRounds = 8;
-  CarriedColourway made;
+  constexpr int kMostTraces = 3;
   const coordinator::OrderLevels levels = levels_of_fit(model, request);
+  CarriedColourway best;
   std::optional<TracedDifference> difference;
-  std::vector<glm::dvec3> correction = no_correction(request);
+  int traces = 0;
+  ColourRatios correction = no_correction(request);
+  std::vector<shading::FibreMaterial> last;
   for (int round = 0; round < kMostRounds; ++round) {
+    CarriedColourway made;
     made.fit = fit_colourway(model, request, levels, correction);
-    check_reached(request, made.fit);
+    if (made.fit.materials == last && difference) {
+      break;  // as near as the dyes get
+    }
+    last = made.fit.materials;
     const coordinator::CarriedSums sums = model.carrier.sums(made.fit.materials, levels);
     made.contents = carried_contents(model, request, made.fit, sums);
     if (!difference) {
       difference.emplace(made.contents.database, sums, bcsdfs_of(made.fit.materials), model.tracer);
+      ++traces;
     }
     difference->mend(made.contents.database, sums);
     storage::round_as_written(made.contents.database);  // what is measured is what is kept
-    measure_fit(model, request, made.contents.database, made.fit, correction);
-    if (made.fit.worst_delta_e() < kGoodDeltaE) {
+    measure_fit(model, request, made.contents.database,
+                bias.empty() ? no_correction(request) : bias, made.fit, correction);
+    if (made.fit.worst_delta_e() > kFarDeltaE && traces < kMostTraces) {
+      difference.reset();
+    }
+    if (best.fit.materials.empty() || made.fit.worst_delta_e() < best.fit.worst_delta_e()) {
+      best = std::move(made);
+    }
+    if (best.fit.worst_delta_e() < kGoodDeltaE) {
       break;
     }
   }
-  check_reached(request, made.fit);
-  made.error = check_carried(made.contents.database, bcsdfs_of(made.fit.materials), model.tracer);
-  made.contents.recolouring.carried_over_json = coordinator::carried_over_json(
-      {base_name(model.base), model.base.digest.hex(), significant(made.error.light),
-       significant(made.error.light_noise), significant(made.error.matrix)});
-  return made;
+  check_reached(request, best.fit);
+  best.error = check_carried(best.contents.database, bcsdfs_of(best.fit.materials), model.tracer);
+  best.contents.recolouring.carried_over_json = coordinator::carried_over_json(
+      {base_name(model.base), model.base.digest.hex(), significant(best.error.light),
+       significant(best.error.light_noise), significant(best.error.matrix)});
+  return best;
 }
 
 }  // namespace weft::cli

@@ -47,11 +47,14 @@ struct ColourwayRequest {
 [[nodiscard]] coordinator::OrderLevels levels_of_fit(const ColourwayModel& model,
                                                      const ColourwayRequest& request);
 
-// Puts what the targets show in a picture of `database` in the place of what the fit expected, and
-// multiplies `correction` by their ratio.
+// By how much brighter targets show than was expected, by target and channel.
+using ColourRatios = std::vector<glm::dvec3>;
+
+// Puts what the targets show in a picture of `database`, times `bias`, in the place of what the fit
+// expected, and multiplies `correction` by their ratio.
 void measure_fit(const ColourwayModel& model, const ColourwayRequest& request,
-                 const storage::FabricDatabase& database, ColourFit& fit,
-                 std::vector<glm::dvec3>& correction);
+                 const storage::FabricDatabase& database, const ColourRatios& bias, ColourFit& fit,
+                 ColourRatios& correction);
 
 // The source's description in the colours of `fit`.
 [[nodiscard]] v1::FabricDescription recolored_description(const ColourwayRequest& request,
@@ -68,8 +71,12 @@ struct CarriedColourway {
   storage::RecolourableDatabase contents;  // which say what they were carried over from
   CarryError error;
 };
-// Fits, carries over and measures until the colours are met. Throws as check_reached.
+// Fits, carries over and measures until the colours are met, or no other dyes bring them nearer.
+// What is measured counts, not what the fit expects: of few paths it knows little. `bias` is by how
+// much brighter the targets would show if they were traced; empty: as bright. Throws as
+// check_reached.
 [[nodiscard]] CarriedColourway carry_colourway(const ColourwayModel& model,
-                                               const ColourwayRequest& request);
+                                               const ColourwayRequest& request,
+                                               const ColourRatios& bias = {});
 
 }  // namespace weft::cli

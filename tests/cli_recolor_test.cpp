@@ -1,16 +1,22 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <grpcpp/security/server_credentials.h>
+#include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
 
 #include "cli/local_run.h"
 #include "cli/make_colourway.h"
 #include "cli/split_materials.h"
+#include "cli/swatch_colour.h"
+#include "client/publish_colourway.h"
+#include "core/error.h"
 #include "core/exit_code.h"
 #include "core/file.h"
 #include "fabric/description.h"
@@ -204,6 +210,60 @@ TEST_F(RecolorTest, OfAPublishedVersion_ACarriedOverOneIsPublished) {
   ASSERT_EQ(second.code, 0) << second.err;
   EXPECT_EQ(second.json()["version"], "moss@1");
   EXPECT_EQ(second.json()["carried_over"]["from"], "tiny@1");
+}
+
+TEST_F(RecolorTest, ACoordinatorThatTakesNoColourways_IsNamedWithWhatToDo) {
+  // Every call of a service that nobody has written answers as an older program's does.
+  v1::CatalogueService::Service older;
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(&older);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  client::Coordinator coordinator(security::Endpoint("127.0.0.1:" + std::to_string(port)));
+  try {
+    (void)client::publish_colourway(coordinator, {base_, source().digest, "tiny", "tiny@1", ""});
+    ADD_FAILURE() << "it was published";
+  } catch (const core::Error& error) {
+    EXPECT_EQ(error.code(), core::Code::kFailedPrecondition);
+    EXPECT_THAT(error.what(),
+                testing::AllOf(HasSubstr("older"), HasSubstr("-o FILE.h5"), HasSubstr("--exact")));
+  }
+}
+
+TEST_F(RecolorTest, OfFewPaths_WhatCanBeShownIsNotRefused) {
+  const TestFolder folder;
+  const std::string path = folder / "few.h5";
+  make(fabric::load_description(write_description(folder, "512"), v1::QUALITY_PREVIEW), path);
+  const ColourwaySource few = open_colourway_source(path, {});
+  const ColourwayModel of_few(few, 2);
+  for (const char* colour : {"all=#e8e4d8", "all=#1040c0"}) {
+    const ColourwayRequest request{&few, colour_targets({colour}, few.contents.database), "tiny",
+                                   own_exposure(of_few)};
+    EXPECT_LT(carry_colourway(of_few, request).fit.worst_delta_e(), 1) << colour;
+  }
+}
+
+TEST_F(RecolorTest, TheNearestThatIsTraced_IsWhatWasAskedForWhereItCanBeShown) {
+  const TestFolder folder;
+  const std::string path = folder / "few.h5";
+  const std::string output = folder / "claret.h5";
+  make(fabric::load_description(write_description(folder, "512"), v1::QUALITY_PREVIEW), path);
+  const Finished made = run_weft(folder, {"recolor", path, "--yarn", "all=#7a1f2b", "--exact",
+                                          "--nearest", "-o", output, "--json"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  const double exposure = made.json()["exposure"];
+  const ColourwaySource few = open_colourway_source(path, {});
+  const auto targets = colour_targets({"all=#7a1f2b"}, few.contents.database);
+  const auto shown =
+      target_colours(targets, yarn_colours(storage::read_database(output), exposure, 2));
+  ASSERT_EQ(shown.size(), made.json()["targets"].size());
+  for (std::size_t t = 0; t < shown.size(); ++t) {
+    const double delta_e = shading::delta_e_2000(shading::lab_from_linear(shown[t]),
+                                                 shading::lab_from_linear(targets[t].linear));
+    EXPECT_LT(delta_e, 1);
+    EXPECT_NEAR(made.json()["targets"][t]["delta_e_2000"].get<double>(), delta_e, 1e-6);
+  }
 }
 
 TEST_F(RecolorTest, OfAPublishedVersion_ANewOneIsTraced) {
