@@ -52,8 +52,9 @@ double rounding_rms(const std::vector<float>& values) {
   return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
 }
 
-bool are_halves_enough(const std::vector<float>& transfer, const std::vector<float>& errors) {
-  return rounding_rms(transfer) <= kRoundingShare * root_mean_square(errors);
+// Of transfer, by what its rounding and its standard errors are.
+bool are_halves_enough(double rounding, const std::vector<float>& errors) {
+  return rounding <= kRoundingShare * root_mean_square(errors);
 }
 
 void round_to_halves(std::vector<float>& values) {
@@ -147,13 +148,14 @@ class FieldWriter {
 
   void rounded(const char* path, const std::vector<float>& data) {
     const DatasetSpec& spec = dataset_spec(path);
+    const double rounding = rounding_rms(data);
     const bool is_error = &data == &db_.transfer_se;
-    if (is_error || are_halves_enough(data, db_.transfer_se)) {
+    if (is_error || are_halves_enough(rounding, db_.transfer_se)) {
       add(spec, h5::Element::kF16, std::span<const std::uint16_t>(halves_of(data)));
     } else {
       add(spec, h5::Element::kF32, std::span<const float>(data));
     }
-    image_.add_attribute(path, "half_rounding_rms", rounding_rms(data));
+    image_.add_attribute(path, "half_rounding_rms", rounding);
   }
 
   void derived(const char* path) {
@@ -263,7 +265,7 @@ class FileBeside {
 
 void round_as_written(FabricDatabase& database) {
   round_to_halves(database.transfer_se);
-  if (are_halves_enough(database.transfer, database.transfer_se)) {
+  if (are_halves_enough(rounding_rms(database.transfer), database.transfer_se)) {
     round_to_halves(database.transfer);
   }
 }
