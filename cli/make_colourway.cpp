@@ -129,18 +129,28 @@ void measure_fit(const ColourwayModel& model, const ColourwayRequest& request,
   }
 }
 
+namespace {
+
+// Of the materials of that name.
+void set_colours(v1::FabricDescription& description, const std::string& name,
+                 const shading::FibreMaterial& colours) {
+  for (v1::Material& material : *description.mutable_materials()) {
+    if (material.name() == name) {
+      set_rgb(*material.mutable_c_r(), colours.c_r);
+      set_rgb(*material.mutable_c_tt(), colours.c_tt);
+    }
+  }
+}
+
+}  // namespace
+
 v1::FabricDescription recolored_description(const ColourwayRequest& request, const ColourFit& fit) {
   v1::FabricDescription description = request.source->description;
   description.set_name(request.name);
   const std::vector<std::string>& names = request.source->contents.database.material_names;
   for (const YarnTarget& target : request.targets) {
     for (const std::size_t m : target.materials) {
-      for (v1::Material& material : *description.mutable_materials()) {
-        if (material.name() == names[m]) {
-          set_rgb(*material.mutable_c_r(), fit.materials[m].c_r);
-          set_rgb(*material.mutable_c_tt(), fit.materials[m].c_tt);
-        }
-      }
+      set_colours(description, names[m], fit.materials[m]);
     }
   }
   return description;

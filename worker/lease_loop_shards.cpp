@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <new>
 #include <optional>
 #include <utility>
@@ -20,7 +21,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kLongestUndelivered{15'000};
 
-std::uint64_t whole_ms(double seconds) { return static_cast<std::uint64_t>(seconds * 1000 + 0.5); }
+std::uint64_t whole_ms(double seconds) {
+  return static_cast<std::uint64_t>(std::llround(seconds * 1000));
+}
 
 v1::ErrorKind kind_of(const core::Error& error) {
   // Inputs that cannot be had are a shortage, not a fault of the task.

@@ -21,6 +21,21 @@ namespace {
 
 constexpr std::uint64_t kUploadsBetweenSweeps = 256;
 
+grpc::Status send(storage::BlobReader& blob, std::uint64_t offset,
+                  grpc::ServerWriter<v1::ReadResponse>& writer) {
+  blob.skip(offset);
+  v1::ReadResponse response;
+  response.set_size_bytes(blob.size_bytes());
+  do {
+    *response.mutable_data() = blob.read(v1::kChunkLimitBytes);
+    if (!writer.Write(response)) {
+      return {grpc::StatusCode::CANCELLED, "the caller went away"};
+    }
+    response.clear_size_bytes();
+  } while (!blob.is_over());
+  return grpc::Status::OK;
+}
+
 }  // namespace
 
 BlobService::BlobService(Scheduler& scheduler)
@@ -50,23 +65,13 @@ grpc::Status BlobService::Read(grpc::ServerContext* context, const v1::ReadReque
               "offset is beyond the blob's " + std::to_string(blob->size_bytes()) + " bytes"};
     }
     try {
-      blob->skip(request->offset());
-      v1::ReadResponse response;
-      response.set_size_bytes(blob->size_bytes());
-      do {
-        *response.mutable_data() = blob->read(v1::kChunkLimitBytes);
-        if (!writer->Write(response)) {
-          return {grpc::StatusCode::CANCELLED, "the caller went away"};
-        }
-        response.clear_size_bytes();
-      } while (!blob->is_over());
+      return send(*blob, request->offset(), *writer);
     } catch (const core::Error& error) {
       if (error.code() == core::Code::kDataLoss) {
         scheduler_.result_lost(digest);
       }
       throw;
     }
-    return grpc::Status::OK;
   });
 }
 
