@@ -1,17 +1,14 @@
 #include "storage/h5_filters.h"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
 #include <memory>
 #include <new>
 #include <string_view>
-#include <thread>
-#include <utility>
 
 #include <libdeflate.h>
 
 #include "core/check.h"
+#include "core/parallel.h"
 
 namespace weft::storage::h5 {
 
@@ -69,14 +66,19 @@ std::uint32_t fletcher32(std::string_view bytes) {
 }
 
 FilteredChunk filtered(std::span<const std::byte> data, std::size_t chunk_bytes,
-                       std::size_t element_bytes, libdeflate_compressor* compressor) {
+                       std::size_t element_bytes, bool compress) {
   FilteredChunk chunk;
-  if (compressor == nullptr) {
+  if (!compress) {
     chunk.bytes = shuffled(data, chunk_bytes, 1);
   } else {
+    const std::unique_ptr<libdeflate_compressor, Freed> compressor(
+        libdeflate_alloc_compressor(kDeflateLevel));
+    if (!compressor) {
+      throw std::bad_alloc();
+    }
     const std::string plain = shuffled(data, chunk_bytes, element_bytes);
     chunk.bytes.resize(plain.size());
-    const std::size_t size = libdeflate_zlib_compress(compressor, plain.data(), plain.size(),
+    const std::size_t size = libdeflate_zlib_compress(compressor.get(), plain.data(), plain.size(),
                                                       chunk.bytes.data(), chunk.bytes.size());
     if (size == 0) {  // it has no room in as many bytes
       chunk.bytes = plain;
@@ -92,60 +94,6 @@ FilteredChunk filtered(std::span<const std::byte> data, std::size_t chunk_bytes,
   return chunk;
 }
 
-// The chunks of one dataset while threads share them out.
-class Chunks {
- public:
-  Chunks(std::span<const std::byte> data, std::size_t chunk_bytes, std::size_t element_bytes,
-         bool compress)
-      : data_(data),
-        chunk_bytes_(chunk_bytes),
-        element_bytes_(element_bytes),
-        compress_(compress),
-        chunks_((data.size() + chunk_bytes - 1) / chunk_bytes) {}
-
-  [[nodiscard]] std::size_t count() const { return chunks_.size(); }
-
-  // What one thread does of them.
-  void work() noexcept {
-    try {
-      std::unique_ptr<libdeflate_compressor, Freed> compressor;
-      if (compress_) {
-        compressor.reset(libdeflate_alloc_compressor(kDeflateLevel));
-        if (!compressor) {
-          throw std::bad_alloc();
-        }
-      }
-      for (std::size_t i = next_++; i < chunks_.size(); i = next_++) {
-        const std::size_t first = i * chunk_bytes_;
-        const auto held = data_.subspan(first, std::min(chunk_bytes_, data_.size() - first));
-        chunks_[i] = filtered(held, chunk_bytes_, element_bytes_, compressor.get());
-      }
-    } catch (...) {
-      if (!has_failed_.test_and_set()) {
-        failure_ = std::current_exception();
-      }
-    }
-  }
-
-  // REQUIRES: all threads are done.
-  [[nodiscard]] std::vector<FilteredChunk> take() {
-    if (failure_) {
-      std::rethrow_exception(failure_);
-    }
-    return std::move(chunks_);
-  }
-
- private:
-  std::span<const std::byte> data_;
-  std::size_t chunk_bytes_;
-  std::size_t element_bytes_;
-  bool compress_;
-  std::vector<FilteredChunk> chunks_;
-  std::atomic<std::size_t> next_{0};
-  std::atomic_flag has_failed_;
-  std::exception_ptr failure_;
-};
-
 }  // namespace
 
 std::vector<FilteredChunk> filtered_chunks(std::span<const std::byte> data, std::size_t chunk_bytes,
@@ -153,16 +101,13 @@ std::vector<FilteredChunk> filtered_chunks(std::span<const std::byte> data, std:
   CHECK(chunk_bytes > 0 && element_bytes > 0);
   CHECK_EQ(chunk_bytes % element_bytes, 0U);
   CHECK_EQ(data.size() % element_bytes, 0U);
-  Chunks chunks(data, chunk_bytes, element_bytes, compress);
-  {
-    std::vector<std::jthread> helpers;
-    const std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
-    for (std::size_t i = 1; i < std::min(threads, chunks.count()); ++i) {
-      helpers.emplace_back([&chunks] { chunks.work(); });
-    }
-    chunks.work();
-  }
-  return chunks.take();
+  std::vector<FilteredChunk> chunks((data.size() + chunk_bytes - 1) / chunk_bytes);
+  core::in_parallel(chunks.size(), [&](std::size_t i) {
+    const std::size_t first = i * chunk_bytes;
+    const auto held = data.subspan(first, std::min(chunk_bytes, data.size() - first));
+    chunks[i] = filtered(held, chunk_bytes, element_bytes, compress);
+  });
+  return chunks;
 }
 
 }  // namespace weft::storage::h5
