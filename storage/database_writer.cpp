@@ -43,10 +43,10 @@ std::vector<std::uint16_t> halves_of(const std::vector<float>& values) {
   return halves;
 }
 
-double rounding_rms(const std::vector<float>& values) {
+double rounding_rms(const std::vector<float>& values, const std::vector<std::uint16_t>& halves) {
   double sum = 0;
-  for (const float value : values) {
-    const float difference = core::float_from_half(core::half_from_float(value)) - value;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const float difference = core::float_from_half(halves[i]) - values[i];
     sum += static_cast<double>(difference) * static_cast<double>(difference);
   }
   return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
@@ -148,10 +148,11 @@ class FieldWriter {
 
   void rounded(const char* path, const std::vector<float>& data) {
     const DatasetSpec& spec = dataset_spec(path);
-    const double rounding = rounding_rms(data);
+    const std::vector<std::uint16_t> halves = halves_of(data);
+    const double rounding = rounding_rms(data, halves);
     const bool is_error = &data == &db_.transfer_se;
     if (is_error || are_halves_enough(rounding, db_.transfer_se)) {
-      add(spec, h5::Element::kF16, std::span<const std::uint16_t>(halves_of(data)));
+      add(spec, h5::Element::kF16, std::span<const std::uint16_t>(halves));
     } else {
       add(spec, h5::Element::kF32, std::span<const float>(data));
     }
@@ -265,7 +266,8 @@ class FileBeside {
 
 void round_as_written(FabricDatabase& database) {
   round_to_halves(database.transfer_se);
-  if (are_halves_enough(rounding_rms(database.transfer), database.transfer_se)) {
+  if (are_halves_enough(rounding_rms(database.transfer, halves_of(database.transfer)),
+                        database.transfer_se)) {
     round_to_halves(database.transfer);
   }
 }

@@ -14,7 +14,7 @@ namespace weft::storage::h5 {
 
 namespace {
 
-constexpr int kDeflateLevel = 6;
+constexpr int kDeflateLevel = 1;
 constexpr std::uint32_t kDeflateIsSecond = 1U << 1;  // behind shuffle
 
 struct Freed {

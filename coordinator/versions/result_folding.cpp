@@ -1,101 +1,19 @@
 #include "coordinator/versions/result_folding.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <type_traits>
 
-#include "core/error.h"
-#include "core/half.h"
+#include "coordinator/versions/shard_result.h"
 #include "core/moments.h"
-#include "core/stopping.h"
+#include "core/parallel.h"
 #include "fabric/tile.h"
 #include "proto/arrays.h"
-#include "shading/scattering_orders.h"
 #include "shading/shadow_fit.h"
 
 namespace weft::coordinator {
 
 namespace {
-
-// Sums over all shards of a cell: no number of paths overflows it.
-__extension__ typedef __int128 WideSum;
-
-[[noreturn]] void refuse_result(const std::string& name, const std::string& what) {
-  throw core::Error(core::Code::kDataLoss, name + ": the result is malformed: " + what +
-                                               "; delete it and compute it again");
-}
-
-// The envelope's own errors know neither stage nor shard: `name` says them.
-template <class Function>
-std::invoke_result_t<Function> naming(const std::string& name, Function function) {
-  try {
-    return function();
-  } catch (const core::Error& error) {
-    refuse_result(name, error.what());
-  }
-}
-
-// The result of one shard, read array by array.
-class ShardResult {
- public:
-  ShardResult(const FinishedStage& finished, std::uint64_t shard, const ReadBlob& read_blob)
-      : name_(std::string("stage ") + to_string(finished.stage.name) + ", shard " +
-              std::to_string(shard)) {
-    const std::string bytes = read_blob(finished.shards[shard]);
-    arrays_ = naming(name_, [&] { return v1::parse_arrays(bytes); });
-  }
-
-  // Array `name`, which must have this shape.
-  template <class T>
-  [[nodiscard]] std::vector<T> array(const char* name,
-                                     const std::vector<std::uint64_t>& expected) const {
-    std::vector<std::uint64_t> shape;
-    std::vector<T> data = naming(name_, [&] { return v1::array_of<T>(arrays_, name, &shape); });
-    if (shape != expected) {
-      refuse(std::string("array '") + name + "' has shape " + text_of(shape) + " where " +
-             text_of(expected) + " was planned");
-    }
-    return data;
-  }
-
-  // The extents of array `name`.
-  template <class T>
-  [[nodiscard]] std::vector<std::uint64_t> shape_of(const char* name) const {
-    std::vector<std::uint64_t> shape;
-    naming(name_, [&] { return v1::array_of<T>(arrays_, name, &shape); });
-    return shape;
-  }
-
-  [[noreturn]] void refuse(const std::string& what) const { refuse_result(name_, what); }
-
-  void require(bool holds, const char* what) const {
-    if (!holds) {
-      refuse(what);
-    }
-  }
-
- private:
-  static std::string text_of(const std::vector<std::uint64_t>& shape) {
-    std::string text = "[";
-    for (const std::uint64_t extent : shape) {
-      text += (text.size() > 1 ? ", " : "") + std::to_string(extent);
-    }
-    return text + "]";
-  }
-
-  std::string name_;
-  v1::Arrays arrays_;
-};
-
-bool all_finite(const std::vector<float>& values) {
-  return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
-}
-
-bool all_finite(const std::vector<v1::Half>& values) {
-  constexpr std::uint16_t kExponent = 0x7c00;
-  return std::all_of(values.begin(), values.end(),
-                     [](v1::Half v) { return (v.bits & kExponent) != kExponent; });
-}
 
 // Row i of a strided shard goes to row shard + i * shards of the whole.
 struct Stride {
@@ -111,96 +29,6 @@ void scatter(const std::vector<v1::Half>& rows, const Stride& stride,
     for (std::uint64_t j = 0; j < stride.width; ++j) {
       whole[row * stride.width + j] = rows[i * stride.width + j].bits;
     }
-  }
-}
-
-// Sums over the shards of one cell.
-struct CellSums {
-  std::uint64_t paths = 0;
-  std::vector<WideSum> sum;
-  std::vector<WideSum> sum_of_squares;
-  std::vector<WideSum> order_numbers;
-  std::vector<WideSum> order_shapes;
-};
-
-void add_to(std::vector<WideSum>& sums, const std::vector<std::int64_t>& more) {
-  sums.resize(more.size(), 0);
-  for (std::size_t i = 0; i < more.size(); ++i) {
-    sums[i] += more[i];
-  }
-}
-
-// Whether the results of this stage tell orders of scattering apart.
-bool has_orders(const v1::TransferSpec& spec) {
-  const auto materials = static_cast<std::size_t>(spec.materials_size());
-  return spec.estimator() == v1::TRANSFER_ESTIMATOR_EXIT && materials >= 1 &&
-         materials <= shading::kMostCountedMaterials;
-}
-
-void add_orders(const ShardResult& result, const v1::TransferSpec& spec, CellSums& cell) {
-  const auto materials = static_cast<std::size_t>(spec.materials_size());
-  const std::uint64_t low = shading::shape_coefficients(spec.sh_order());
-  const auto numbers = result.array<std::int64_t>(
-      "order_numbers", {shading::order_groups(materials), shading::kOrderBins, 3,
-                        1 + shading::order_counts(materials)});
-  result.require(std::all_of(numbers.begin(), numbers.end(), [](auto n) { return n >= 0; }),
-                 "light or a count of its scatterings is negative");
-  add_to(cell.order_numbers, numbers);
-  add_to(cell.order_shapes,
-         result.array<std::int64_t>("order_shapes", {shading::kOrderShapes, low, low}));
-}
-
-std::uint16_t half_of(double value) {
-  constexpr double kLargestHalf = 65504;
-  return core::half_from_float(static_cast<float>(std::clamp(value, -kLargestHalf, kLargestHalf)));
-}
-
-double mean_of(WideSum sum, std::uint64_t paths) {
-  return paths == 0
-             ? 0
-             : static_cast<double>(sum) / core::kFixedPointScale / static_cast<double>(paths);
-}
-
-// Light, mean counts of it and shapes of one cell.
-void fold_orders(const CellSums& cell, std::size_t materials, storage::Recolouring& recolouring) {
-  const std::size_t width = 1 + shading::order_counts(materials);
-  for (std::size_t row = 0; row < cell.order_numbers.size(); row += width) {
-    const WideSum light = cell.order_numbers[row];
-    recolouring.order_light.push_back(half_of(mean_of(light, cell.paths)));
-    for (std::size_t k = 1; k < width; ++k) {
-      const double count =
-          light > 0 ? static_cast<double>(cell.order_numbers[row + k]) / static_cast<double>(light)
-                    : 0;
-      recolouring.order_counts.push_back(half_of(count));
-    }
-  }
-  for (const WideSum sum : cell.order_shapes) {
-    recolouring.order_shapes.push_back(half_of(mean_of(sum, cell.paths)));
-  }
-}
-
-void add_shard(const FinishedStage& transfer, std::uint64_t shard, const ReadBlob& read_blob,
-               CellSums& cell) {
-  const v1::TransferSpec& spec = transfer.stage.spec.transfer();
-  const std::uint64_t n = std::uint64_t{spec.sh_order() + 1} * (spec.sh_order() + 1);
-  const ShardResult result(transfer, shard, read_blob);
-  const auto paths = result.array<std::uint64_t>("paths", {1});
-  const auto sum = result.array<std::int64_t>("sum", {3, n, n});
-  const auto sum_of_squares = result.array<std::int64_t>("sum_of_squares", {3, n, n});
-  result.require(paths[0] <= spec.paths_per_shard(), "it has more paths than a shard holds");
-  result.require(
-      std::all_of(sum_of_squares.begin(), sum_of_squares.end(), [](auto s) { return s >= 0; }),
-      "a sum of squares is negative");
-  if (spec.target_standard_error() > 0) {
-    result.require(core::ends_at({spec.target_standard_error(), spec.paths_per_cell()},
-                                 {sum, sum_of_squares, paths[0]}),
-                   "its paths end where the target standard error lets none end");
-  }
-  cell.paths += paths[0];
-  add_to(cell.sum, sum);
-  add_to(cell.sum_of_squares, sum_of_squares);
-  if (has_orders(spec)) {
-    add_orders(result, spec, cell);
   }
 }
 
@@ -283,9 +111,9 @@ void fold_coefficients(const FinishedStage& coefficients,
   database.open_share.resize(segments);
   database.ssg_rotation.resize(segments);
   const bool has_held_out = basis_shards.size() < shards;
-  std::uint64_t wrong = 0;
-  std::uint64_t compared = 0;
-  for (std::uint64_t shard = 0; shard < shards; ++shard) {
+  std::atomic<std::uint64_t> wrong{0};
+  std::atomic<std::uint64_t> compared{0};
+  core::in_parallel(shards, [&](std::size_t shard) {
     const ShardResult result(coefficients, shard, read_blob);
     const std::uint64_t rows = (segments - shard + shards - 1) / shards;
     const auto ssdf = result.array<v1::Half>("ssdf", {rows, components});
@@ -307,7 +135,7 @@ void fold_coefficients(const FinishedStage& coefficients,
       wrong += sign_errors[0];
       compared += sign_errors[1];
     }
-  }
+  });
   database.ssdf_sign_error =
       compared == 0 ? 0 : static_cast<double>(wrong) / static_cast<double>(compared);
 }
@@ -338,41 +166,6 @@ double fold_shadow(const FinishedStage& shadow, const ReadBlob& read_blob,
   const shading::ShadowFit fit = shading::fit_shadow(light);
   database.sigma_shadow_mm = static_cast<float>(fit.sigma * bin_mm);
   return fit.error;
-}
-
-void fold_transfer(const FinishedStage& transfer, const ReadBlob& read_blob,
-                   storage::FabricDatabase& database, storage::Recolouring& recolouring) {
-  const v1::TransferSpec& spec = transfer.stage.spec.transfer();
-  const std::uint64_t n = std::uint64_t{spec.sh_order() + 1} * (spec.sh_order() + 1);
-  const std::uint64_t cells = database.cell_coordinates.size() / 3;
-  const std::uint64_t blocks = transfer.shards.size() / cells;
-  database.sh_order = spec.sh_order();
-  database.transfer.reserve(cells * 3 * n * n);
-  database.transfer_se.reserve(cells * 3 * n * n);
-  for (std::uint64_t cell = 0; cell < cells; ++cell) {
-    CellSums sums;
-    for (std::uint64_t block = 0; block < blocks; ++block) {
-      add_shard(transfer, cell * blocks + block, read_blob, sums);
-    }
-    if (spec.target_standard_error() == 0 && sums.paths != spec.paths_per_cell()) {
-      throw core::Error(core::Code::kDataLoss,
-                        "stage transfer, shards " + std::to_string(cell * blocks) + " to " +
-                            std::to_string(cell * blocks + blocks - 1) + ": they have " +
-                            std::to_string(sums.paths) + " paths together where " +
-                            std::to_string(spec.paths_per_cell()) +
-                            " were planned; delete them and compute them again");
-    }
-    database.cell_paths.push_back(sums.paths);
-    fold_orders(sums, static_cast<std::size_t>(spec.materials_size()), recolouring);
-    for (std::size_t i = 0; i < sums.sum.size(); ++i) {
-      const core::MeanAndError moments =
-          core::mean_and_error(static_cast<double>(sums.sum[i]) / core::kFixedPointScale,
-                               static_cast<double>(sums.sum_of_squares[i]) / core::kFixedPointScale,
-                               static_cast<double>(sums.paths));
-      database.transfer.push_back(static_cast<float>(moments.mean));
-      database.transfer_se.push_back(static_cast<float>(moments.standard_error));
-    }
-  }
 }
 
 }  // namespace weft::coordinator

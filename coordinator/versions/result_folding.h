@@ -17,6 +17,7 @@ struct FinishedStage {
   std::vector<core::Digest> shards;
 };
 
+// Called by several threads at once.
 using ReadBlob = std::function<std::string(const core::Digest&)>;
 
 // Each of these folds the results of one stage into its part of the database, in index order. All
