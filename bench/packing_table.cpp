@@ -74,7 +74,7 @@ void print_row(const std::string& path, v1::Quality quality) {
   const v1::FabricDescription description = fabric::load_description(path, quality);
   const core::Stopwatch stopwatch;
   fabric::UntangleReport untangled;
-  const fabric::Tile tile = fabric::build_tile(description, nullptr, &untangled);
+  const fabric::Tile tile = fabric::build_tile(description, {.untangled = &untangled});
   const double seconds = stopwatch.seconds();
   const v1::Yarn& yarn = description.yarns(0);
   const fabric::YarnModel model = fabric::yarn_model(yarn, description.exemplar());

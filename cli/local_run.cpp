@@ -46,10 +46,11 @@ struct RunningStage {
 // one shard leaves the other threads to the next stage.
 class LocalRun {
  public:
-  LocalRun(const v1::FabricDescription& description, ResultCache& cache, const LocalRunHooks& hooks)
-      : description_(description), cache_(cache), hooks_(hooks) {}
+  LocalRun(const v1::FabricDescription& description, unsigned threads, ResultCache& cache,
+           const LocalRunHooks& hooks)
+      : description_(description), threads_(threads), cache_(cache), hooks_(hooks) {}
 
-  void run(unsigned threads);
+  void run();
   [[nodiscard]] std::vector<coordinator::StageResults> results() const;
   [[nodiscard]] std::vector<StageProgress> progress() const;
   [[nodiscard]] std::string read(const core::Digest& digest) const { return cache_.read(digest); }
@@ -72,6 +73,7 @@ class LocalRun {
   void stop(std::exception_ptr cause);
 
   const v1::FabricDescription& description_;
+  const unsigned threads_;
   ResultCache& cache_;
   const LocalRunHooks& hooks_;
   const core::Digest fingerprint_ = worker::numerics_fingerprint();
@@ -114,7 +116,7 @@ std::unique_ptr<RunningStage> LocalRun::start(coordinator::Stage plan) const {
   }
   stage->done = stage->cached;
   if (!stage->todo.empty()) {
-    worker::BakerContext context{plan.spec, plan.shard_count, {}};
+    worker::BakerContext context{plan.spec, plan.shard_count, {}, threads_};
     for (const core::Digest& input : plan.inputs) {
       context.inputs.push_back(cache_.read(input));
     }
@@ -195,6 +197,7 @@ std::optional<LocalRun::Claim> LocalRun::claim() {
 void LocalRun::bake(const Claim& claim) {
   RunningStage& stage = *claim.stage;
   const double cpu_before = core::thread_cpu_seconds();
+  const core::Stopwatch since_start;
   const std::string shard_input = stage.plan.shard_inputs.empty()
                                       ? std::string()
                                       : cache_.read(stage.plan.shard_inputs[claim.shard]);
@@ -204,7 +207,10 @@ void LocalRun::bake(const Claim& claim) {
   std::unique_ptr<worker::Baker> spent;  // released outside the lock: a scene is large
   const std::lock_guard lock(mutex_);
   stage.results[claim.shard] = digest;
-  stage.cpu_seconds += core::thread_cpu_seconds() - cpu_before;
+  const double cpu_seconds = core::thread_cpu_seconds() - cpu_before;
+  stage.cpu_seconds += cpu_seconds;
+  // A shard that took more CPU time than time had help of threads that are waiting for shards.
+  idle_seconds_ -= std::max(0.0, cpu_seconds - since_start.seconds());
   ++stage.done;
   if (stage.is_finished()) {
     stage.seconds = stage.since_start.seconds();
@@ -259,10 +265,10 @@ void LocalRun::follow() {
   }
 }
 
-void LocalRun::run(unsigned threads) {
+void LocalRun::run() {
   {
     std::vector<std::jthread> workers;
-    for (unsigned i = 0; i < threads; ++i) {
+    for (unsigned i = 0; i < threads_; ++i) {
       workers.emplace_back([this] { work(); });
     }
     try {
@@ -282,8 +288,8 @@ void LocalRun::run(unsigned threads) {
 LocalRunResult run_locally(const v1::FabricDescription& description, unsigned threads,
                            ResultCache& cache, const std::filesystem::path& output,
                            const LocalRunHooks& hooks) {
-  LocalRun run(description, cache, hooks);
-  run.run(threads);
+  LocalRun run(description, threads, cache, hooks);
+  run.run();
   hooks.report(run.progress());
   const auto reader = [&](const core::Digest& digest) { return run.read(digest); };
   const core::Stopwatch since_merge;

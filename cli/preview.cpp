@@ -89,7 +89,8 @@ void preview(const PreviewOptions& options) {
   const fabric::TileEstimate estimate = fabric::estimate_tile(description);
   fabric::RelaxReport relaxed;
   fabric::UntangleReport untangled;
-  const fabric::Tile tile = fabric::build_tile(description, &relaxed, &untangled);
+  const fabric::Tile tile =
+      fabric::build_tile(description, {.relaxed = &relaxed, .untangled = &untangled});
   const double build_seconds = stopwatch.seconds();
   draw(options, description, tile);
   const double seconds = stopwatch.seconds();

@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/resource_use.h"
+
 namespace weft::core {
 
 namespace {
@@ -50,21 +52,28 @@ class Deal {
 
 }  // namespace
 
-void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work) {
+void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work,
+                 unsigned most_threads) {
   Deal deal(count, work);
+  const unsigned cores =
+      most_threads == kAllCores ? std::max(1U, std::thread::hardware_concurrency()) : most_threads;
+  const std::size_t threads = std::min<std::size_t>(cores, count);
+  std::atomic<double> helpers_cpu_seconds{0};
   {
     std::vector<std::jthread> others;
-    const std::size_t threads =
-        std::min<std::size_t>(std::max(1U, std::thread::hardware_concurrency()), count);
     try {
       while (others.size() + 1 < threads) {
-        others.emplace_back([&deal] { deal.take_part(); });
+        others.emplace_back([&] {
+          deal.take_part();
+          helpers_cpu_seconds += thread_cpu_seconds();
+        });
       }
     } catch (const std::system_error&) {
       // There are as many threads as the system gives.
     }
     deal.take_part();
   }
+  add_thread_cpu_seconds(helpers_cpu_seconds);
   deal.rethrow();
 }
 

@@ -111,8 +111,7 @@ void bound_height(Tile& tile) {
 
 }  // namespace
 
-Tile build_tile(const v1::FabricDescription& description, RelaxReport* report,
-                UntangleReport* untangled) {
+Tile build_tile(const v1::FabricDescription& description, const BuildOptions& options) {
   refuse_if_too_large(estimate_tile(description));
   Tile tile;
   for (const v1::Yarn& yarn : description.yarns()) {
@@ -127,16 +126,16 @@ Tile build_tile(const v1::FabricDescription& description, RelaxReport* report,
     refuse_if_too_long(repeat);
     const RelaxReport relaxed = relax(repeat);
     refuse_if_overlapping(relaxed);
-    if (report != nullptr) {
-      *report = relaxed;
+    if (options.relaxed != nullptr) {
+      *options.relaxed = relaxed;
     }
     const YarnLayout layout = repeat_layout(repeat, repeats);
     tile.size_mm = glm::vec2(layout.size_mm);
     tile.blocks = repeats;
     lay_threads(description, layout, tile);
-    const UntangleReport moved = untangle(tile);
-    if (untangled != nullptr) {
-      *untangled = moved;
+    const UntangleReport moved = untangle(tile, options.most_threads);
+    if (options.untangled != nullptr) {
+      *options.untangled = moved;
     }
   }
   bound_height(tile);

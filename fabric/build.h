@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "core/parallel.h"
 #include "fabric/relax.h"
 #include "fabric/tile.h"
 #include "fabric/untangle.h"
@@ -14,10 +15,16 @@ namespace weft::fabric {
 // geometry part. The same description gives the same bytes. Throws core::Error(kInvalidArgument)
 // when no such cloth can be built (yarns that cannot be packed) and kResourceExhausted when the
 // tile would exceed kTileLimitBytes or one repeat kRelaxedNodeLimit.
-// When `report` is given, it is told how the yarns were relaxed, `untangled` how their fibres were
-// moved apart (explicit fibres stay as they are).
+// On any number of threads the same.
+struct BuildOptions {
+  unsigned most_threads = core::kAllCores;
+  // When given, told how the yarns were relaxed and how their fibres were moved apart (explicit
+  // fibres stay as they are).
+  RelaxReport* relaxed = nullptr;
+  UntangleReport* untangled = nullptr;
+};
 [[nodiscard]] Tile build_tile(const v1::FabricDescription& description,
-                              RelaxReport* report = nullptr, UntangleReport* untangled = nullptr);
+                              const BuildOptions& options = {});
 
 // What a tile will need, computed from the description alone, before any of it is built.
 struct TileEstimate {

@@ -8,8 +8,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "fabric/fibres.h"
-
 namespace weft::fabric {
 
 namespace {
@@ -81,22 +79,19 @@ class PieceGrid {
     }
   }
 
-  // Of the pairs of cells that may hold pairs of pieces one half is visited: the other half are the
-  // same pairs from their other end.
-  void collect(std::vector<FibrePair>& pairs) {
-    for (int z = 0; z < cells_.z; ++z) {
-      for (int y = 0; y < cells_.y; ++y) {
-        for (int x = 0; x < cells_.x; ++x) {
-          collect_round({x, y, z}, pairs);
-        }
-      }
-    }
-    keep_candidates(pairs);
+  [[nodiscard]] const FibreBody& body() const { return body_; }
+  [[nodiscard]] double margin_mm() const { return margin_mm_; }
+  [[nodiscard]] glm::ivec3 cells() const { return cells_; }
+  [[nodiscard]] glm::ivec2 around() const { return around_; }  // cells that a piece reaches into
+  [[nodiscard]] const Members& members() const { return members_; }
+  [[nodiscard]] glm::ivec2 tile_of(std::uint32_t piece) const { return tiles_[piece]; }
+  [[nodiscard]] std::uint32_t index(glm::ivec3 cell) const {
+    return static_cast<std::uint32_t>((cell.z * cells_.y + cell.y) * cells_.x + cell.x);
   }
+  // The first member of a cell; that of the next one is behind its last.
+  [[nodiscard]] std::uint32_t start(std::uint32_t cell) const { return starts_[cell]; }
 
  private:
-  static int floor_divide(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
-
   void measure() {
     double reach = 0;
     double low = 1e300;
@@ -135,106 +130,6 @@ class PieceGrid {
             cell(place.z - low_mm_, cell_mm_.z, cells_.z)};
   }
 
-  [[nodiscard]] std::uint32_t index(glm::ivec3 cell) const {
-    return static_cast<std::uint32_t>((cell.z * cells_.y + cell.y) * cells_.x + cell.x);
-  }
-
-  // The pairs of `home` with itself and with the cells behind it, by z, then y, then x.
-  void collect_round(glm::ivec3 home, std::vector<FibrePair>& pairs) {
-    const std::uint32_t c = index(home);
-    for (std::uint32_t m = starts_[c]; m < starts_[c + 1]; ++m) {
-      collect_from(m, m + 1, starts_[c + 1], {0, 0}, pairs);
-    }
-    collect_row(home, home, {home.x + 1, home.x + around_.x}, pairs);
-    for (int dy = 1; dy <= around_.y; ++dy) {
-      collect_row(home, {home.x, home.y + dy, home.z}, {home.x - around_.x, home.x + around_.x},
-                  pairs);
-    }
-    for (int dy = -around_.y; home.z + 1 < cells_.z && dy <= around_.y; ++dy) {
-      collect_row(home, {home.x, home.y + dy, home.z + 1}, {home.x - around_.x, home.x + around_.x},
-                  pairs);
-    }
-  }
-
-  // The pairs of `home` with cells first to last of a row of cells; those beyond the tile's borders
-  // are copies. Members of neighbours in a row lie side by side.
-  void collect_row(glm::ivec3 home, glm::ivec3 row, glm::ivec2 first_and_last,
-                   std::vector<FibrePair>& pairs) {
-    const std::uint32_t c = index(home);
-    const int wrap_y = floor_divide(row.y, cells_.y);
-    const int y = row.y - wrap_y * cells_.y;
-    for (int x = first_and_last.x; x <= first_and_last.y;) {
-      const int wrap_x = floor_divide(x, cells_.x);
-      const int last = std::min(first_and_last.y, (wrap_x + 1) * cells_.x - 1);
-      const std::uint32_t first_member = starts_[index({x - wrap_x * cells_.x, y, row.z})];
-      const std::uint32_t end = starts_[index({last - wrap_x * cells_.x, y, row.z}) + 1];
-      for (std::uint32_t m = starts_[c]; m < starts_[c + 1]; ++m) {
-        collect_from(m, first_member, end, {wrap_x, wrap_y}, pairs);
-      }
-      x = last + 1;
-    }
-  }
-
-  // The pairs of one member with those from `first` to before `end`, whose cells' copy lies `wrap`
-  // tiles away.
-  void collect_from(std::uint32_t member, std::uint32_t first, std::uint32_t end, glm::ivec2 wrap,
-                    std::vector<FibrePair>& pairs) {
-    const glm::vec3 at =
-        members_.middle_mm(member) - glm::vec3(static_cast<float>(wrap.x * body_.size_mm.x),
-                                               static_cast<float>(wrap.y * body_.size_mm.y), 0);
-    near_.resize(std::max<std::size_t>(near_.size(), end - first + sizeof(std::uint64_t)));
-    members_.measure(at, members_.reach_mm[member], first, end, near_.data());
-    std::fill_n(near_.begin() + (end - first), sizeof(std::uint64_t), std::uint8_t{0});
-    for (std::uint32_t m = first; m < end; m += sizeof(std::uint64_t)) {
-      std::uint64_t eight = 0;
-      std::memcpy(&eight, near_.data() + (m - first), sizeof eight);
-      for (; eight != 0; eight &= eight - 1) {
-        const auto byte = static_cast<std::uint32_t>(std::countr_zero(eight)) / 8;
-        keep_if_close(members_.piece[member], members_.piece[m + byte], wrap, pairs);
-      }
-    }
-  }
-
-  void keep_if_close(std::uint32_t u, std::uint32_t v, glm::ivec2 wrap,
-                     std::vector<FibrePair>& pairs) {
-    const FibrePair pair{u, v, wrap + tiles_[u] - tiles_[v]};
-    if (same_fibre(pair)) {
-      return;
-    }
-    candidates_.push_back(pair);
-    if (candidates_.size() == Approaches::kCount) {
-      keep_candidates(pairs);
-    }
-  }
-
-  void keep_candidates(std::vector<FibrePair>& pairs) {
-    approaches_.measure(body_, candidates_);
-    for (std::size_t i = 0; i < candidates_.size(); ++i) {
-      const FibrePair& pair = candidates_[i];
-      const double near =
-          body_.pieces[pair.u].radius_mm + body_.pieces[pair.v].radius_mm + margin_mm_;
-      if (approaches_.gap2(i) < near * near) {
-        pairs.push_back(pair);
-      }
-    }
-    candidates_.clear();
-  }
-
-  [[nodiscard]] bool same_fibre(const FibrePair& pair) const {
-    const std::uint32_t strand = body_.pieces[pair.u].strand;
-    if (strand != body_.pieces[pair.v].strand) {
-      return false;
-    }
-    // A whole multiple of the period: parallel to it, and divisible by it.
-    const glm::ivec2 period = body_.strand_periods[strand];
-    const glm::ivec2 copy = pair.copy;
-    if (copy.x * period.y != copy.y * period.x) {
-      return false;
-    }
-    return (period.x == 0 ? copy.x == 0 : copy.x % period.x == 0) &&
-           (period.y == 0 ? copy.y == 0 : copy.y % period.y == 0);
-  }
-
   const FibreBody& body_;
   double margin_mm_;
   double low_mm_ = 0;
@@ -246,50 +141,135 @@ class PieceGrid {
   std::vector<double> reaches_;      // [piece]: from its midpoint, half the margin included
   std::vector<std::uint32_t> starts_;
   Members members_;
+};
+
+// The pairs of one row of cells with all that lie behind it: of the pairs of cells that may hold
+// pairs of pieces one half is visited, the other half are the same ones from their other end.
+class RowPairs {
+ public:
+  explicit RowPairs(const PieceGrid& grid) : grid_(grid) {}
+
+  [[nodiscard]] std::vector<FibrePair> collect(int y, int z) {
+    std::vector<FibrePair> pairs;
+    for (int x = 0; x < grid_.cells().x; ++x) {
+      collect_round({x, y, z}, pairs);
+    }
+    keep_candidates(pairs);
+    return pairs;
+  }
+
+ private:
+  static int floor_divide(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
+
+  // The pairs of `home` with itself and with the cells behind it, by z, then y, then x.
+  void collect_round(glm::ivec3 home, std::vector<FibrePair>& pairs) {
+    const std::uint32_t c = grid_.index(home);
+    const glm::ivec2 around = grid_.around();
+    for (std::uint32_t m = grid_.start(c); m < grid_.start(c + 1); ++m) {
+      collect_from(m, m + 1, grid_.start(c + 1), {0, 0}, pairs);
+    }
+    collect_row(home, home, {home.x + 1, home.x + around.x}, pairs);
+    for (int dy = 1; dy <= around.y; ++dy) {
+      collect_row(home, {home.x, home.y + dy, home.z}, {home.x - around.x, home.x + around.x},
+                  pairs);
+    }
+    for (int dy = -around.y; home.z + 1 < grid_.cells().z && dy <= around.y; ++dy) {
+      collect_row(home, {home.x, home.y + dy, home.z + 1}, {home.x - around.x, home.x + around.x},
+                  pairs);
+    }
+  }
+
+  // The pairs of `home` with cells first to last of a row of cells; those beyond the tile's borders
+  // are copies. Members of neighbours in a row lie side by side.
+  void collect_row(glm::ivec3 home, glm::ivec3 row, glm::ivec2 first_and_last,
+                   std::vector<FibrePair>& pairs) {
+    const std::uint32_t c = grid_.index(home);
+    const glm::ivec3 cells = grid_.cells();
+    const int wrap_y = floor_divide(row.y, cells.y);
+    const int y = row.y - wrap_y * cells.y;
+    for (int x = first_and_last.x; x <= first_and_last.y;) {
+      const int wrap_x = floor_divide(x, cells.x);
+      const int last = std::min(first_and_last.y, (wrap_x + 1) * cells.x - 1);
+      const std::uint32_t first_member = grid_.start(grid_.index({x - wrap_x * cells.x, y, row.z}));
+      const std::uint32_t end = grid_.start(grid_.index({last - wrap_x * cells.x, y, row.z}) + 1);
+      for (std::uint32_t m = grid_.start(c); m < grid_.start(c + 1); ++m) {
+        collect_from(m, first_member, end, {wrap_x, wrap_y}, pairs);
+      }
+      x = last + 1;
+    }
+  }
+
+  // The pairs of one member with those from `first` to before `end`, whose cells' copy lies `wrap`
+  // tiles away.
+  void collect_from(std::uint32_t member, std::uint32_t first, std::uint32_t end, glm::ivec2 wrap,
+                    std::vector<FibrePair>& pairs) {
+    const Members& members = grid_.members();
+    const FibreBody& body = grid_.body();
+    const glm::vec3 at =
+        members.middle_mm(member) - glm::vec3(static_cast<float>(wrap.x * body.size_mm.x),
+                                              static_cast<float>(wrap.y * body.size_mm.y), 0);
+    near_.resize(std::max<std::size_t>(near_.size(), end - first + sizeof(std::uint64_t)));
+    members.measure(at, members.reach_mm[member], first, end, near_.data());
+    std::fill_n(near_.begin() + (end - first), sizeof(std::uint64_t), std::uint8_t{0});
+    for (std::uint32_t m = first; m < end; m += sizeof(std::uint64_t)) {
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, near_.data() + (m - first), sizeof eight);
+      for (; eight != 0; eight &= eight - 1) {
+        const auto byte = static_cast<std::uint32_t>(std::countr_zero(eight)) / 8;
+        keep_if_close(members.piece[member], members.piece[m + byte], wrap, pairs);
+      }
+    }
+  }
+
+  void keep_if_close(std::uint32_t u, std::uint32_t v, glm::ivec2 wrap,
+                     std::vector<FibrePair>& pairs) {
+    const FibrePair pair{u, v, wrap + grid_.tile_of(u) - grid_.tile_of(v)};
+    if (same_fibre(pair)) {
+      return;
+    }
+    candidates_.push_back(pair);
+    if (candidates_.size() == Approaches::kCount) {
+      keep_candidates(pairs);
+    }
+  }
+
+  void keep_candidates(std::vector<FibrePair>& pairs) {
+    const FibreBody& body = grid_.body();
+    approaches_.measure(body, candidates_);
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+      const FibrePair& pair = candidates_[i];
+      const double near =
+          body.pieces[pair.u].radius_mm + body.pieces[pair.v].radius_mm + grid_.margin_mm();
+      if (approaches_.gap2(i) < near * near) {
+        pairs.push_back(pair);
+      }
+    }
+    candidates_.clear();
+  }
+
+  [[nodiscard]] bool same_fibre(const FibrePair& pair) const {
+    const FibreBody& body = grid_.body();
+    const std::uint32_t strand = body.pieces[pair.u].strand;
+    if (strand != body.pieces[pair.v].strand) {
+      return false;
+    }
+    // A whole multiple of the period: parallel to it, and divisible by it.
+    const glm::ivec2 period = body.strand_periods[strand];
+    const glm::ivec2 copy = pair.copy;
+    if (copy.x * period.y != copy.y * period.x) {
+      return false;
+    }
+    return (period.x == 0 ? copy.x == 0 : copy.x % period.x == 0) &&
+           (period.y == 0 ? copy.y == 0 : copy.y % period.y == 0);
+  }
+
+  const PieceGrid& grid_;
   std::vector<std::uint8_t> near_;     // scratch
   std::vector<FibrePair> candidates_;  // scratch, at most Approaches::kCount
   Approaches approaches_;
 };
 
 }  // namespace
-
-FibreBody::FibreBody(const Tile& tile) : size_mm(tile.size_mm) {
-  for (std::uint32_t s = 0; s < tile.strands.size(); ++s) {
-    const Strand& strand = tile.strands[s];
-    const bool periodic = strand.period_x != 0 || strand.period_y != 0;
-    const auto first = static_cast<std::uint32_t>(nodes_mm.size());
-    const std::uint32_t count = strand.point_count - (periodic ? 1 : 0);
-    strand_periods.emplace_back(strand.period_x, strand.period_y);
-    first_nodes.push_back(first);
-    for (std::uint32_t p = 0; p < count; ++p) {
-      nodes_mm.emplace_back(tile.points_mm[strand.first_point + p]);
-    }
-    for (std::uint32_t p = 0; p + 1 < strand.point_count; ++p) {
-      const bool closes = p + 1 == count;
-      Piece piece{first + p, closes ? first : first + p + 1, s,
-                  static_cast<double>(strand.radius_mm), glm::dvec3(0)};
-      if (closes) {
-        piece.shift_mm = {strand.period_x * size_mm.x, strand.period_y * size_mm.y, 0};
-      }
-      pieces.push_back(piece);
-    }
-  }
-  first_nodes.push_back(static_cast<std::uint32_t>(nodes_mm.size()));
-}
-
-void FibreBody::write_to(Tile& tile) const {
-  for (std::size_t s = 0; s < tile.strands.size(); ++s) {
-    const Strand& strand = tile.strands[s];
-    const std::uint32_t count = first_nodes[s + 1] - first_nodes[s];
-    for (std::uint32_t p = 0; p < count; ++p) {
-      tile.points_mm[strand.first_point + p] = glm::vec3(nodes_mm[first_nodes[s] + p]);
-    }
-    if (count < strand.point_count) {
-      tile.points_mm[strand.first_point + count] =
-          period_end(tile.points_mm[strand.first_point], strand_periods[s], tile.size_mm);
-    }
-  }
-}
 
 // Ericson, Real-Time Collision Detection (2005), section 5.1.9, without a branch.
 std::size_t Approaches::measure(const FibreBody& body, std::span<const FibrePair> pairs) {
@@ -347,12 +327,24 @@ std::size_t Approaches::measure(const FibreBody& body, std::span<const FibrePair
   return count;
 }
 
-std::vector<FibrePair> close_pairs(const FibreBody& body, double margin_mm) {
-  std::vector<FibrePair> pairs;
+std::vector<FibrePair> close_pairs(const FibreBody& body, double margin_mm, unsigned most_threads) {
   if (body.pieces.empty()) {
-    return pairs;
+    return {};
   }
-  PieceGrid(body, margin_mm).collect(pairs);
+  const PieceGrid grid(body, margin_mm);
+  const auto rows = static_cast<std::size_t>(grid.cells().y);
+  std::vector<std::vector<FibrePair>> of_row(rows * static_cast<std::size_t>(grid.cells().z));
+  core::in_parallel(
+      of_row.size(),
+      [&](std::size_t i) {
+        of_row[i] = RowPairs(grid).collect(static_cast<int>(i % rows), static_cast<int>(i / rows));
+      },
+      most_threads);
+  std::vector<FibrePair> pairs;
+  for (std::vector<FibrePair>& some : of_row) {
+    pairs.insert(pairs.end(), some.begin(), some.end());
+    some = {};
+  }
   return pairs;
 }
 

@@ -8,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "core/parallel.h"
 #include "fabric/fibre_pairs.h"
 
 namespace weft::fabric {
@@ -27,6 +28,7 @@ constexpr double kPush = 1.4;      // of the mean correction of a node's contact
 constexpr double kSmoothFirst = 0.5;
 constexpr double kSmoothLast = 0.1;
 constexpr double kPullFirst = 0.03;
+constexpr std::size_t kPairsTogether = 64 * Approaches::kCount;  // that one thread takes at a time
 constexpr double kTouching2 = 1e-18;  // squared gap without a direction, in square radii
 
 double faded(double first, double last, std::uint32_t iteration) {
@@ -43,7 +45,8 @@ glm::dvec3 any_across(glm::dvec3 direction) {
 
 class Untangling {
  public:
-  explicit Untangling(const Tile& tile) : body_(tile), laid_mm_(body_.nodes_mm) {
+  Untangling(const Tile& tile, unsigned most_threads)
+      : most_threads_(most_threads), body_(tile), laid_mm_(body_.nodes_mm) {
     radii_mm_.resize(body_.nodes_mm.size());
     thinnest_mm_ = std::numeric_limits<double>::max();
     for (const FibreBody::Piece& piece : body_.pieces) {
@@ -55,7 +58,7 @@ class Untangling {
   void run() {
     for (std::uint32_t n = 0; n < kIterations; ++n) {
       if (n % kIterationsPerPairList == 0 && is_list_worn()) {
-        pairs_ = close_pairs(body_, kListMargin * thinnest_mm_);
+        pairs_ = close_pairs(body_, kListMargin * thinnest_mm_, most_threads_);
         listed_mm_ = body_.nodes_mm;
       }
       push_apart();
@@ -87,15 +90,26 @@ class Untangling {
     return static_cast<double>(worn) > kWornShare * static_cast<double>(listed_mm_.size());
   }
 
+  // Two pieces that overlap: where, and what brings them apart.
+  struct Contact {
+    FibrePair pair;
+    double at_u = 0;
+    double at_v = 0;
+    glm::dvec3 move_mm{0};  // of v; u gives way as far the other way
+  };
+
+  // Contacts are found by all threads and act in the order of the pairs.
   void push_apart() {
+    contacts_.resize((pairs_.size() + kPairsTogether - 1) / kPairsTogether);
+    core::in_parallel(
+        contacts_.size(), [this](std::size_t i) { find_contacts(i); }, most_threads_);
     corrections_mm_.assign(body_.nodes_mm.size(), glm::dvec3(0));
     weights_.assign(body_.nodes_mm.size(), 0);
-    for (std::span<const FibrePair> left = pairs_; !left.empty();) {
-      const std::size_t count = approaches_.measure(body_, left);
-      for (std::size_t i = 0; i < count; ++i) {
-        push_apart(left[i], i);
+    for (const std::vector<Contact>& some : contacts_) {
+      for (const Contact& contact : some) {
+        give(body_.pieces[contact.pair.u], contact.at_u, -contact.move_mm);
+        give(body_.pieces[contact.pair.v], contact.at_v, contact.move_mm);
       }
-      left = left.subspan(count);
     }
     for (std::size_t n = 0; n < body_.nodes_mm.size(); ++n) {
       if (weights_[n] > 0) {
@@ -107,23 +121,39 @@ class Untangling {
     }
   }
 
-  // The pair whose approach is the i-th of approaches_.
-  void push_apart(const FibrePair& pair, std::size_t i) {
+  // Of the i-th kPairsTogether pairs.
+  void find_contacts(std::size_t i) {
+    std::vector<Contact>& contacts = contacts_[i];
+    contacts.clear();
+    Approaches approaches;
+    std::span<const FibrePair> left(pairs_);
+    left = left.subspan(i * kPairsTogether);
+    left = left.first(std::min(left.size(), kPairsTogether));
+    while (!left.empty()) {
+      const std::size_t count = approaches.measure(body_, left);
+      for (std::size_t k = 0; k < count; ++k) {
+        add_if_touching(left[k], approaches, k, contacts);
+      }
+      left = left.subspan(count);
+    }
+  }
+
+  // The pair whose approach is the k-th of `approaches`.
+  void add_if_touching(const FibrePair& pair, const Approaches& approaches, std::size_t k,
+                       std::vector<Contact>& contacts) const {
     const FibreBody::Piece& u = body_.pieces[pair.u];
     const FibreBody::Piece& v = body_.pieces[pair.v];
     const double apart = u.radius_mm + v.radius_mm;
-    const double gap2 = approaches_.gap2(i);
+    const double gap2 = approaches.gap2(k);
     if (gap2 >= apart * apart) {
       return;
     }
-    const Approach approach = approaches_[i];
+    const Approach approach = approaches[k];
     const double gap = std::sqrt(gap2);
     const glm::dvec3 away = gap2 > kTouching2 * apart * apart
                                 ? approach.gap_mm / gap
                                 : any_across(body_.end_mm(u) - body_.begin_mm(u));
-    const glm::dvec3 move = away * (0.5 * (apart - gap));
-    give(u, approach.at_u, -move);
-    give(v, approach.at_v, move);
+    contacts.push_back({pair, approach.at_u, approach.at_v, away * (0.5 * (apart - gap))});
   }
 
   // Moves the place at `share` of the piece by `move`, with the least motion of its ends.
@@ -139,32 +169,37 @@ class Untangling {
   // Levels displacements along every fibre and pulls them back.
   void settle(double smooth, double pull) {
     displacements_mm_.resize(body_.nodes_mm.size());
-    for (std::size_t n = 0; n < laid_mm_.size(); ++n) {
+    core::in_parallel(
+        body_.strand_periods.size(), [&](std::size_t s) { settle_strand(s, smooth, pull); },
+        most_threads_);
+  }
+
+  void settle_strand(std::size_t s, double smooth, double pull) {
+    const std::uint32_t first = body_.first_nodes[s];
+    const std::uint32_t count = body_.first_nodes[s + 1] - first;
+    const bool open = body_.strand_periods[s] == glm::ivec2(0, 0);
+    for (std::uint32_t n = first; n < first + count; ++n) {
       displacements_mm_[n] = body_.nodes_mm[n] - laid_mm_[n];
     }
-    for (std::size_t s = 0; s < body_.strand_periods.size(); ++s) {
-      const std::uint32_t first = body_.first_nodes[s];
-      const std::uint32_t count = body_.first_nodes[s + 1] - first;
-      const bool open = body_.strand_periods[s] == glm::ivec2(0, 0);
-      for (std::uint32_t k = 0; k < count; ++k) {
-        const std::uint32_t before = k > 0 ? k - 1 : (open ? 0 : count - 1);
-        const std::uint32_t after = k + 1 < count ? k + 1 : (open ? k : 0);
-        const glm::dvec3 level =
-            0.5 * (displacements_mm_[first + before] + displacements_mm_[first + after]);
-        const glm::dvec3 here = displacements_mm_[first + k];
-        body_.nodes_mm[first + k] =
-            laid_mm_[first + k] + (here + (level - here) * smooth) * (1 - pull);
-      }
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const std::uint32_t before = k > 0 ? k - 1 : (open ? 0 : count - 1);
+      const std::uint32_t after = k + 1 < count ? k + 1 : (open ? k : 0);
+      const glm::dvec3 level =
+          0.5 * (displacements_mm_[first + before] + displacements_mm_[first + after]);
+      const glm::dvec3 here = displacements_mm_[first + k];
+      body_.nodes_mm[first + k] =
+          laid_mm_[first + k] + (here + (level - here) * smooth) * (1 - pull);
     }
   }
 
+  unsigned most_threads_;
   FibreBody body_;
   std::vector<glm::dvec3> laid_mm_;
   std::vector<double> radii_mm_;  // [node]
   double thinnest_mm_ = 0;
   std::vector<FibrePair> pairs_;
-  Approaches approaches_;
-  std::vector<glm::dvec3> listed_mm_;  // the nodes when the list was made
+  std::vector<std::vector<Contact>> contacts_;  // [kPairsTogether pairs]
+  std::vector<glm::dvec3> listed_mm_;           // the nodes when the list was made
   std::vector<glm::dvec3> corrections_mm_;
   std::vector<double> weights_;
   std::vector<glm::dvec3> displacements_mm_;
@@ -181,17 +216,17 @@ double distance2_to_piece(const FibreBody& body, const FibreBody::Piece& piece, 
 
 }  // namespace
 
-UntangleReport untangle(Tile& tile) {
-  Untangling untangling(tile);
+UntangleReport untangle(Tile& tile, unsigned most_threads) {
+  Untangling untangling(tile, most_threads);
   untangling.run();
   untangling.body().write_to(tile);
-  return {kIterations, buried_share(tile), untangling.mean_moved_mm()};
+  return {kIterations, buried_share(tile, most_threads), untangling.mean_moved_mm()};
 }
 
-double buried_share(const Tile& tile) {
+double buried_share(const Tile& tile, unsigned most_threads) {
   const FibreBody body(tile);
   std::vector<bool> buried(body.pieces.size(), false);
-  for (const FibrePair& pair : close_pairs(body, 0)) {
+  for (const FibrePair& pair : close_pairs(body, 0, most_threads)) {
     const FibreBody::Piece& u = body.pieces[pair.u];
     const FibreBody::Piece& v = body.pieces[pair.v];
     const glm::dvec3 copy(pair.copy.x * body.size_mm.x, pair.copy.y * body.size_mm.y, 0);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "core/parallel.h"
 #include "fabric/tile.h"
 
 namespace weft::fabric {
@@ -21,11 +22,11 @@ struct UntangleReport {
 // way by half (position-based, all contacts at once, so no order is preferred). Displacements are
 // smoothed along every fibre, which keeps it as smooth as it was laid, and pulled back to the laid
 // path, which keeps twist and crimp. Periodic strands keep their period exactly, tips are free.
-// The same tile gives the same bytes.
-UntangleReport untangle(Tile& tile);
+// The same tile gives the same bytes, on any number of threads.
+UntangleReport untangle(Tile& tile, unsigned most_threads = core::kAllCores);
 
 // Share of the segments whose midpoint lies inside another fibre; a fibre's lateral copies are
 // other fibres.
-[[nodiscard]] double buried_share(const Tile& tile);
+[[nodiscard]] double buried_share(const Tile& tile, unsigned most_threads = core::kAllCores);
 
 }  // namespace weft::fabric

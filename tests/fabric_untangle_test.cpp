@@ -61,7 +61,7 @@ Tile parallel_fibres(const std::vector<glm::dvec2>& places_mm, float radius_mm, 
 TEST(Untangle, FibresOfClothHardlyOverlap) {
   for (const char* rows : {kPlain, kSatin}) {
     UntangleReport report;
-    const Tile tile = build_tile(describe(rows), nullptr, &report);
+    const Tile tile = build_tile(describe(rows), {.untangled = &report});
     EXPECT_LT(report.buried_share, kBuriedTolerance);
     EXPECT_EQ(report.buried_share, buried_share(tile));
     EXPECT_GT(report.mean_moved_mm, 0);
@@ -112,8 +112,11 @@ TEST(Untangle, FibresStaySmooth) {
   EXPECT_LT(bends[bends.size() * 99 / 100], 40 * degree);
 }
 
-TEST(Untangle, IsTheSameEveryTime) {
-  EXPECT_EQ(encode_tile(build_tile(describe(kPlain))), encode_tile(build_tile(describe(kPlain))));
+TEST(Untangle, IsTheSameEveryTimeOnAnyNumberOfThreads) {
+  const std::string alone = encode_tile(build_tile(describe(kPlain), {.most_threads = 1}));
+  EXPECT_EQ(encode_tile(build_tile(describe(kPlain), {.most_threads = 1})), alone);
+  EXPECT_EQ(encode_tile(build_tile(describe(kPlain), {.most_threads = 2})), alone);
+  EXPECT_EQ(encode_tile(build_tile(describe(kPlain), {.most_threads = 7})), alone);
 }
 
 TEST(Untangle, FibresWithRoomStayWhereTheyAre) {

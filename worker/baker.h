@@ -16,6 +16,7 @@ struct BakerContext {
   v1::TaskSpec spec;
   std::uint64_t shard_count = 0;
   std::vector<std::string> inputs;  // bytes, in the order the spec's comment names them
+  unsigned most_threads = 1;        // that a stage of one shard may take, while others wait for it
 };
 
 // Computes shards of one stage. Made once per stage (it decodes the inputs and builds the Embree

@@ -15,7 +15,8 @@ class GeometryBaker : public Baker {
                    const std::function<bool()>& should_stop) const override {
     require_shard(shard, context_.shard_count);
     transport::pass(stop_point(should_stop));
-    const fabric::Tile tile = fabric::build_tile(context_.spec.geometry().description());
+    const fabric::Tile tile = fabric::build_tile(context_.spec.geometry().description(),
+                                                 {.most_threads = context_.most_threads});
     transport::pass(stop_point(should_stop));
     return fabric::encode_tile(tile);
   }

@@ -61,7 +61,7 @@ LeaseLoop::LeaseLoop(WorkerOptions options, const std::shared_ptr<grpc::Channel>
       stub_(v1::WorkerService::NewStub(channel)),
       blobs_(channel),
       inputs_(options_.scratch, options_.scratch_limit_bytes, blobs_),
-      bakers_(inputs_, options_.make_baker),
+      bakers_(inputs_, options_.make_baker, options_.threads),
       spool_(spool_root(options_), id_, options_.spool_limit_bytes),
       logs_(channel),
       table_(options_.threads),

@@ -56,7 +56,7 @@ StageBakers::Prepared StageBakers::of(const v1::Assignment& assignment,
     return {slot->baker, 0};
   }
   const core::Stopwatch since_start;
-  BakerContext context{assignment.spec(), assignment.shard_count(), {}};
+  BakerContext context{assignment.spec(), assignment.shard_count(), {}, threads_};
   for (const std::string& input : assignment.inputs()) {
     if (should_stop()) {
       throw core::Error(core::Code::kCancelled, "stopped while preparing a stage");

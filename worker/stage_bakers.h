@@ -24,7 +24,9 @@ class StageBakers {
  public:
   using Maker = std::function<std::unique_ptr<Baker>(BakerContext)>;  // make_baker's type
 
-  StageBakers(InputCache& inputs, Maker maker) : inputs_(inputs), maker_(std::move(maker)) {}
+  // Stages of one shard take up to `threads` of them.
+  StageBakers(InputCache& inputs, Maker maker, unsigned threads)
+      : inputs_(inputs), maker_(std::move(maker)), threads_(threads) {}
 
   struct Prepared {
     std::shared_ptr<const Baker> baker;  // shared: the cache may drop it while shards still run
@@ -50,6 +52,7 @@ class StageBakers {
 
   InputCache& inputs_;
   const Maker maker_;
+  const unsigned threads_;
   std::mutex mutex_;
   std::list<std::shared_ptr<Slot>> slots_;  // the one used last first
 };
