@@ -91,7 +91,8 @@ class ClosedDatabase {
 
  private:
   [[nodiscard]] h5::Reader open() const {
-    return h5::Reader(std::as_bytes(std::span(bytes_)), kUserBlockBytes);
+    return h5::Reader(std::as_bytes(std::span(bytes_)), kUserBlockBytes,
+                      h5::Decoding::kByAllThreads);
   }
 
   std::string bytes_;

@@ -25,7 +25,8 @@ std::set<std::string> paths_of(const Specs& specs) {
 // A file of which every object is one of the schema's.
 class SchemaReader : public h5::Reader {
  public:
-  explicit SchemaReader(std::span<const std::byte> file) : h5::Reader(file, kUserBlockBytes) {
+  SchemaReader(std::span<const std::byte> file, h5::Decoding decoding)
+      : h5::Reader(file, kUserBlockBytes, decoding) {
     require_only(paths_of(group_specs()), paths_of(dataset_specs()));
   }
 };
@@ -37,7 +38,7 @@ core::SandboxHandler database_handler() {
           [](std::span<const std::byte> file, const std::vector<std::string>& arguments,
              core::FlatWriter& answer) {
             const bool wants_arrays = arguments.empty() || arguments.front() != kShapesRequest;
-            SchemaReader reader(file);
+            SchemaReader reader(file, h5::Decoding::kInThisThread);
             flatten_database(reader, wants_arrays ? Flattened::kArrays : Flattened::kShapes,
                              answer);
           }};
@@ -48,7 +49,7 @@ ParsedDatabase parse_database_here(std::string_view file, const std::string& nam
   if (core::digest_of(file.substr(kUserBlockBytes)) != block.digest) {
     throw core::Error(core::Code::kDataLoss, name + " does not have the digest it states");
   }
-  SchemaReader reader(std::as_bytes(std::span(file)));
+  SchemaReader reader(std::as_bytes(std::span(file)), h5::Decoding::kByAllThreads);
   return {block.digest, read_contents(reader)};
 }
 

@@ -14,9 +14,6 @@ namespace weft::storage::h5 {
 namespace {
 
 constexpr std::uint64_t kIndexBytes = 16;  // of a chunk in the file, at least
-constexpr std::uint64_t kFletcherBytes = 4;
-
-using Coordinates = std::vector<hsize_t>;
 
 // The chunks of a dataset: small enough, and as many as the file can index. Returns how many the
 // shape needs.
@@ -46,68 +43,44 @@ std::uint64_t check_chunks(Id properties, const std::string& path, const Dataset
   return chunks;
 }
 
-void check_filters(Id properties, const std::string& path) {
-  constexpr int kFiltersLimit = 3;
+// Where a filter stands among those of a dataset; nothing when it is none of ours.
+std::optional<int> order_of(H5Z_filter_t filter) {
+  switch (filter) {
+    case H5Z_FILTER_SHUFFLE:
+      return 0;
+    case H5Z_FILTER_DEFLATE:
+      return 1;
+    case H5Z_FILTER_FLETCHER32:
+      return 2;
+    default:
+      return std::nullopt;
+  }
+}
+
+void check_filters(Id properties, const std::string& path, std::uint64_t element_bytes) {
   const int filters = H5Pget_nfilters(properties);
+  int last = -1;
   for (int i = 0; i < filters; ++i) {
     unsigned flags = 0;
-    std::size_t values = 0;
+    unsigned value = 0;
+    std::size_t values = 1;
     const H5Z_filter_t filter = H5Pget_filter2(properties, static_cast<unsigned>(i), &flags,
-                                               &values, nullptr, 0, nullptr, nullptr);
-    if (filter != H5Z_FILTER_SHUFFLE && filter != H5Z_FILTER_DEFLATE &&
-        filter != H5Z_FILTER_FLETCHER32) {
+                                               &values, &value, 0, nullptr, nullptr);
+    const std::optional<int> order = order_of(filter);
+    if (!order) {
       throw_damaged(path, "uses a filter that fabric databases do not have");
     }
+    if (*order <= last) {
+      throw_damaged(path, "uses filters in an order that fabric databases do not have");
+    }
+    if (filter == H5Z_FILTER_SHUFFLE && (values != 1 || value != element_bytes)) {
+      throw_damaged(path, "is shuffled by another size than that of its elements");
+    }
+    last = *order;
   }
-  if (filters < 0 || filters > kFiltersLimit) {
+  if (filters < 0) {
     throw_damaged(path, "has damaged filters");
   }
-}
-
-// What deflate makes of a chunk that it cannot shorten, with room for checksums.
-std::uint64_t longest_stored(std::uint64_t chunk_bytes) {
-  constexpr std::uint64_t kOverheadBytes = 64;
-  return chunk_bytes + chunk_bytes / 1000 + kOverheadBytes;
-}
-
-std::vector<H5Z_filter_t> filters_of(Id properties) {
-  std::vector<H5Z_filter_t> filters;
-  for (int i = 0; i < H5Pget_nfilters(properties); ++i) {
-    unsigned flags = 0;
-    std::size_t values = 0;
-    filters.push_back(H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &values, nullptr,
-                                     0, nullptr, nullptr));
-  }
-  return filters;
-}
-
-// How long a chunk is in the file when it is not deflated; nothing when it is. A bit of `skipped`
-// stands for a filter that was left out.
-std::optional<std::uint64_t> plain_bytes(const std::vector<H5Z_filter_t>& filters,
-                                         std::uint32_t skipped, std::uint64_t chunk_bytes) {
-  std::uint64_t bytes = chunk_bytes;
-  for (std::size_t i = 0; i < filters.size(); ++i) {
-    if ((skipped >> i & 1) != 0) {
-      continue;
-    }
-    if (filters[i] == H5Z_FILTER_DEFLATE) {
-      return std::nullopt;
-    }
-    bytes += filters[i] == H5Z_FILTER_FLETCHER32 ? kFletcherBytes : 0;
-  }
-  return bytes;
-}
-
-// To the next chunk, in the order of their coordinates; whether there is one.
-bool advance(Coordinates& at, const Coordinates& chunk, const Shape& shape) {
-  for (std::size_t axis = at.size(); axis-- > 0;) {
-    at[axis] += chunk[axis];
-    if (at[axis] < shape[axis]) {
-      return true;
-    }
-    at[axis] = 0;
-  }
-  return false;
 }
 
 }  // namespace
@@ -123,7 +96,7 @@ void check_storage(Id dataset, const std::string& path, const DatasetSource::Inf
   if (H5Pget_chunk_opts(properties.id(), &options) < 0 || options != 0) {
     throw_damaged(path, "has chunks of a kind that fabric databases do not have");
   }
-  check_filters(properties.id(), path);
+  check_filters(properties.id(), path, info.element_bytes);
   const std::uint64_t chunks = check_chunks(properties.id(), path, info, file_bytes);
   const Handle space(H5Dget_space(dataset));
   hsize_t stored = 0;
@@ -131,35 +104,6 @@ void check_storage(Id dataset, const std::string& path, const DatasetSource::Inf
     throw_damaged(path, "has " + std::to_string(stored) + " chunks where its shape needs " +
                             std::to_string(chunks));
   }
-}
-
-void check_chunk_lengths(Id dataset, const std::string& path, const DatasetSource::Info& info) {
-  const Handle properties(H5Dget_create_plist(dataset));
-  const std::vector<H5Z_filter_t> filters = filters_of(properties.id());
-  Coordinates chunk(info.shape.size());
-  if (H5Pget_chunk(properties.id(), static_cast<int>(chunk.size()), chunk.data()) < 0) {
-    throw_damaged(path, "has damaged chunks");
-  }
-  const std::uint64_t chunk_bytes =
-      bytes_of(Shape(chunk.begin(), chunk.end()), info.element_bytes).value_or(0);
-  std::vector<char> stored;
-  Coordinates at(chunk.size(), 0);
-  do {
-    hsize_t stored_bytes = 0;
-    if (H5Dget_chunk_storage_size(dataset, at.data(), &stored_bytes) < 0 || stored_bytes == 0 ||
-        stored_bytes > longest_stored(chunk_bytes)) {
-      throw_damaged(path, "has chunks of impossible lengths");
-    }
-    stored.resize(stored_bytes);
-    std::uint32_t skipped = 0;
-    if (H5Dread_chunk(dataset, H5P_DEFAULT, at.data(), &skipped, stored.data()) < 0) {
-      throw_damaged(path, "has damaged chunks");
-    }
-    const auto plain = plain_bytes(filters, skipped, chunk_bytes);
-    if (plain && *plain != stored_bytes) {
-      throw_damaged(path, "has chunks that are shorter or longer than they should be");
-    }
-  } while (advance(at, chunk, info.shape));
 }
 
 }  // namespace weft::storage::h5

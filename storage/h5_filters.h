@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace weft::storage::h5 {
@@ -21,5 +22,19 @@ struct FilteredChunk {
 [[nodiscard]] std::vector<FilteredChunk> filtered_chunks(std::span<const std::byte> data,
                                                          std::size_t chunk_bytes,
                                                          std::size_t element_bytes, bool compress);
+
+// What was done to a chunk, in this order.
+struct ChunkFilters {
+  bool shuffle = false;
+  bool deflate = false;
+  bool fletcher32 = false;
+};
+
+// Undoes what was done to the chunk `stored`: `data`, which has its full size, is what it held.
+// Returns false when the checksum or the compression does not hold, or it held more or less than
+// that; `data` may be anything then. Takes memory for `data` once more. Any thread may call, on
+// bytes from anywhere. REQUIRES: data.size() is a multiple of element_bytes.
+[[nodiscard]] bool undo_filters(std::string_view stored, const ChunkFilters& filters,
+                                std::size_t element_bytes, std::span<std::byte> data);
 
 }  // namespace weft::storage::h5

@@ -13,6 +13,7 @@
 #include "core/check.h"
 #include "core/error.h"
 #include "core/mistakes.h"
+#include "storage/h5_chunk_reader.h"
 #include "storage/h5_chunks.h"
 #include "storage/h5_types.h"
 
@@ -70,8 +71,8 @@ std::uint64_t decoded_limit_bytes(std::uint64_t file_bytes) {
              : std::min(kReadLimitBytes, kReadAllowanceBytes + kReadRatio * file_bytes);
 }
 
-Reader::Reader(std::span<const std::byte> file, std::uint64_t user_block_bytes)
-    : file_bytes_(file.size()) {
+Reader::Reader(std::span<const std::byte> file, std::uint64_t user_block_bytes, Decoding decoding)
+    : file_bytes_(file.size()), decoding_(decoding) {
   const auto refuse = [] {
     throw core::Error(core::Code::kDataLoss,
                       "the file is damaged: HDF5 cannot open it; fetch or make it again");
@@ -238,32 +239,14 @@ void Reader::admit(const std::string& path, const Info& info) {
 }
 
 void Reader::read(const std::string& path, const Info& info, std::span<std::byte> out) {
-  CHECK_EQ(info.bytes, out.size());
-  const Handle dataset = open(path);
-  check_chunk_lengths(dataset.id(), path, info);
-  const Handle type = type_of(info.element, info.element_bytes);
-  if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, out.data()) < 0) {
-    throw_damaged(path, "is damaged: its checksum or its compression does not hold");
-  }
+  read_rows(path, info, 0, info.shape.front(), out);
 }
 
 void Reader::read_rows(const std::string& path, const Info& info, std::uint64_t first,
                        std::uint64_t count, std::span<std::byte> out) {
   CHECK(first + count <= info.shape.front());
   CHECK_EQ(info.bytes / info.shape.front() * count, out.size());
-  const Handle dataset = open(path);
-  const Handle type = type_of(info.element, info.element_bytes);
-  std::vector<hsize_t> begin(info.shape.size(), 0);
-  std::vector<hsize_t> extents(info.shape.begin(), info.shape.end());
-  begin.front() = first;
-  extents.front() = count;
-  const Handle rows(H5Dget_space(dataset.id()));
-  const Handle memory(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr));
-  if (H5Sselect_hyperslab(rows.id(), H5S_SELECT_SET, begin.data(), nullptr, extents.data(),
-                          nullptr) < 0 ||
-      H5Dread(dataset.id(), type.id(), memory.id(), rows.id(), H5P_DEFAULT, out.data()) < 0) {
-    throw_damaged(path, "is damaged: its checksum or its compression does not hold");
-  }
+  read_chunks(open(path).id(), path, info, {first, count}, decoding_, out);
 }
 
 }  // namespace weft::storage::h5

@@ -21,6 +21,9 @@ inline constexpr std::uint64_t kChunkLimitBytes = std::uint64_t{64} << 20;
 inline constexpr std::uint64_t kAttributesLimit = 32;
 inline constexpr std::uint64_t kHeaderLimitBytes = std::uint64_t{64} << 10;
 
+// Who unfolds chunks: the sandbox may start no threads.
+enum class Decoding { kInThisThread, kByAllThreads };
+
 // Reads a file that may be hostile, from memory: refuses what leads out of the file (links,
 // external and virtual storage), filters that we do not write, shapes that the file is too small to
 // hold, chunks and headers of absurd size, chunks that are missing, and what unfolds to more than
@@ -30,7 +33,7 @@ class Reader : public DatasetSource {
  public:
   // `file` is the whole file, whose HDF5 part begins at `user_block_bytes`. REQUIRES: it outlives
   // the reader. Throws core::Error(kDataLoss) when it is no HDF5 file that begins there.
-  Reader(std::span<const std::byte> file, std::uint64_t user_block_bytes);
+  Reader(std::span<const std::byte> file, std::uint64_t user_block_bytes, Decoding decoding);
 
   // Throws unless every object in the file is one of these, reached by hard links alone.
   void require_only(const std::set<std::string>& groups, const std::set<std::string>& datasets);
@@ -40,9 +43,8 @@ class Reader : public DatasetSource {
   [[nodiscard]] std::vector<Extent> chunks(const std::string& path) override;
   void admit(const std::string& path, const Info& info) override;
   void read(const std::string& path, const Info& info, std::span<std::byte> out) override;
-  // The rows [first, first + count) of the first axis, for a file of our own making: neither
-  // admitted nor with the lengths of its chunks checked. REQUIRES: `info` is this dataset's, there
-  // are so many rows, and `out` holds them.
+  // The rows [first, first + count) of the first axis, which are not admitted. REQUIRES: `info` is
+  // this dataset's, there are so many rows, and `out` holds them.
   void read_rows(const std::string& path, const Info& info, std::uint64_t first,
                  std::uint64_t count, std::span<std::byte> out);
 
@@ -54,6 +56,7 @@ class Reader : public DatasetSource {
 
   Session session_;
   std::uint64_t file_bytes_ = 0;
+  Decoding decoding_;
   std::uint64_t decoded_bytes_ = 0;
   std::uint64_t claimed_bytes_ = 0;
   Handle file_;

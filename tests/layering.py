@@ -28,8 +28,8 @@ ORDER = {"coordinator": ["queue", "journal", "versions", "scheduler", "services"
 
 # Third-party header -> the files that alone include it.
 BEHIND = {
-    r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_chunks.cpp", "storage/h5_reader.cpp",
-                           "storage/h5_types.cpp"},
+    r"hdf5\.h|H5.*\.h": {"storage/h5.cpp", "storage/h5_chunk_reader.cpp", "storage/h5_chunks.cpp",
+                           "storage/h5_reader.cpp", "storage/h5_types.cpp"},
     r"libdeflate\.h": {"storage/h5_filters.cpp"},
     r"embree3/.*": {"transport/embree_scene.cpp", "render/triangle_scene.cpp"},
     r"(OpenEXR/)?Imf.*": {"render/image.cpp", "render/files/exr_parser.cpp"},
