@@ -189,7 +189,7 @@ int bench(int argc, char** argv) {
   const ObjMesh mesh = read_obj(argv[1]);
   const auto device = gpu::Device::open();
   std::printf(
-      "| fabric | Embree, s | C++, s | %s, s | C++ differs | kernel differs | 32 | 64 | 128 "
+      "| fabric | hierarchy, s | C++, s | %s, s | C++ differs | kernel differs | 32 | 64 | 128 "
       "samples differ | fibres seen | MiB | built in, s |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|\n",
       device->info().name.c_str());

@@ -16,6 +16,7 @@
 #include "core/random.h"
 #include "fabric/build.h"
 #include "fabric/description.h"
+#include "transport/clamped_distance.h"
 #include "transport/distance_fit.h"
 #include "transport/pca.h"
 #include "transport/signed_distance.h"
@@ -27,6 +28,7 @@ namespace {
 
 constexpr std::uint32_t kResolution = 128;
 constexpr std::uint32_t kPixels = kResolution * kResolution;
+constexpr std::size_t kBytes = kPixels / 8;
 constexpr std::size_t kHeldOut = 400;
 constexpr std::size_t kSample = 1024;
 
@@ -44,7 +46,7 @@ Bits varied_images(const fabric::Tile& tile, std::size_t count) {
   const transport::VisibilityRaster raster(scene, kResolution);
   core::Random random(11, 0);
   Bits images;
-  while (images.size() < count * kPixels / 8) {
+  while (images.size() < count * kBytes) {
     const Bits bits = raster.bits(random.below(tile.segment_count()));
     const bool is_varied = std::any_of(bits.begin(), bits.end(),
                                        [&](std::uint8_t byte) { return byte != bits.front(); });
@@ -56,17 +58,30 @@ Bits varied_images(const fabric::Tile& tile, std::size_t count) {
 }
 
 std::vector<float> distances_of(const Bits& images) {
-  std::vector<float> all;
-  all.reserve(images.size() * 8);
-  for (std::size_t at = 0; at < images.size(); at += kPixels / 8) {
-    std::vector<float> distances =
-        transport::signed_distance(std::span(images).subspan(at, kPixels / 8), kResolution);
-    transport::correct_pixel_bias(distances, kResolution);
-    for (const float d : distances) {
-      all.push_back(std::clamp(d, -transport::kDistanceClamp, transport::kDistanceClamp));
-    }
+  const transport::ClampedDistances clamped(kResolution);
+  std::vector<float> all(images.size() * 8);
+  for (std::size_t at = 0; at < images.size(); at += kBytes) {
+    clamped.measure(std::span(images).subspan(at, kBytes), std::span(all).subspan(8 * at, kPixels));
   }
   return all;
+}
+
+// Share of the pixels next to which, to the right or below, the sky ends or begins.
+double edge_share(const Bits& images) {
+  std::uint64_t edges = 0;
+  for (std::size_t at = 0; at < images.size(); at += kBytes) {
+    const auto image = std::span(images).subspan(at, kBytes);
+    for (std::uint32_t p = 0; p < kPixels; ++p) {
+      const std::uint32_t right = p / kResolution * kResolution + (p + 1) % kResolution;
+      const std::uint32_t below = std::min(p + kResolution, kPixels - 1);
+      const bool here = transport::is_visible(image, p);
+      const bool is_edge =
+          here != transport::is_visible(image, right) ||
+          (p + kResolution < kPixels && here != transport::is_visible(image, below));
+      edges += is_edge ? 1 : 0;
+    }
+  }
+  return static_cast<double>(edges) / static_cast<double>(8 * images.size());
 }
 
 // Each component's largest value in `sample` [images, components] is the largest integer.
@@ -104,10 +119,10 @@ double wrong_share(const Bits& sample, const Bits& held_out, const Layout& layou
 
 void print_row(const std::string& name, const fabric::Tile& tile) {
   const Bits images = varied_images(tile, kHeldOut + kSample);
-  const auto middle = images.begin() + static_cast<std::ptrdiff_t>(kHeldOut * kPixels / 8);
+  const auto middle = images.begin() + static_cast<std::ptrdiff_t>(kHeldOut * kBytes);
   const Bits held_out(images.begin(), middle);
   const Bits sample(middle, images.end());
-  fmt::print("| {} |", name);
+  fmt::print("| {} | {:.1f} % |", name, 100 * edge_share(images));
   for (const Layout& layout : kLayouts) {
     fmt::print(" {:.2f} % |", 100 * wrong_share(sample, held_out, layout));
     std::fflush(stdout);
@@ -122,8 +137,8 @@ int main(int count, char** arguments) {
   using namespace weft;
   std::vector<std::string> paths(arguments + 1, arguments + count);
   const bool paper = std::erase(paths, "--paper") > 0;
-  fmt::print("| fabric |");
-  std::string rule = "|---|";
+  fmt::print("| fabric | pixels at edges |");
+  std::string rule = "|---|---|";
   for (const bench::Layout& layout : bench::kLayouts) {
     fmt::print(" {} of {} bits, {} B |", layout.components, layout.bits,
                layout.components * static_cast<unsigned>(layout.bits) / 8);

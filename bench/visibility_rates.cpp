@@ -23,6 +23,7 @@
 #include "core/random.h"
 #include "fabric/build.h"
 #include "fabric/description.h"
+#include "transport/clamped_distance.h"
 #include "transport/distance_fit.h"
 #include "transport/embree_scene.h"
 #include "transport/pca.h"
@@ -126,12 +127,10 @@ void round_to_halves(std::vector<float>& values) {
 }
 
 std::vector<float> clamped(const Bits& bits) {
-  std::vector<float> distances = transport::signed_distance(bits, kResolution);
-  transport::correct_pixel_bias(distances, kResolution);
-  for (float& d : distances) {
-    d = std::clamp(d, -transport::kDistanceClamp, transport::kDistanceClamp);
-  }
-  return distances;
+  static const transport::ClampedDistances distances(kResolution);
+  std::vector<float> image(kPixels);
+  distances.measure(bits, image);
+  return image;
 }
 
 // All that comes after the bits.

@@ -6,6 +6,7 @@
 
 #include "core/random.h"
 #include "tests/transport_images.h"
+#include "transport/clamped_distance.h"
 #include "transport/distance_fit.h"
 #include "transport/normal_equations.h"
 #include "transport/pca.h"
@@ -19,11 +20,8 @@ constexpr std::uint32_t kPixels = kResolution * kResolution;
 
 std::vector<float> clamped_distances(std::span<const std::uint8_t> image,
                                      std::uint32_t resolution = kResolution) {
-  std::vector<float> distances = signed_distance(image, resolution);
-  correct_pixel_bias(distances, resolution);
-  for (float& d : distances) {
-    d = std::clamp(d, -kDistanceClamp, kDistanceClamp);
-  }
+  std::vector<float> distances(std::size_t{resolution} * resolution);
+  ClampedDistances(resolution).measure(image, distances);
   return distances;
 }
 

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "proto/arrays.h"
+#include "transport/clamped_distance.h"
 #include "transport/pca.h"
-#include "transport/signed_distance.h"
 #include "worker/bakers.h"
 #include "worker/visibility_images.h"
 
@@ -32,9 +32,7 @@ class BasisBaker : public Baker {
     require_shard(shard, shard_count_);
     const transport::Checkpoint checkpoint = stop_point(should_stop);
     const std::uint32_t pixels = spec_.resolution() * spec_.resolution();
-    const float bias = transport::pixel_bias(spec_.resolution());
-    const transport::DistanceTransform transform(spec_.resolution(),
-                                                 transport::kDistanceClamp + bias);
+    const transport::ClampedDistances clamped(spec_.resolution());
     std::vector<float> distances(varied_images() * pixels);
     std::size_t next = 0;
     for (const VisibilityImages& images : visibility_) {
@@ -43,12 +41,7 @@ class BasisBaker : public Baker {
         if (is_uniform(images.image(i))) {
           continue;
         }
-        const auto image = std::span(distances).subspan(next, pixels);
-        transform.measure(images.image(i), image);
-        transport::correct_pixel_bias(image, spec_.resolution());
-        for (float& d : image) {
-          d = std::clamp(d, -transport::kDistanceClamp, transport::kDistanceClamp);
-        }
+        clamped.measure(images.image(i), std::span(distances).subspan(next, pixels));
         next += pixels;
       }
     }
