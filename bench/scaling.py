@@ -2,7 +2,9 @@
 """How the time of a job changes with cores, workers and segments; tables of docs/performance.md.
 
     bench/scaling.py cores OUT_DIR FABRIC.textproto ...     one thread, then two
-    bench/scaling.py workers OUT_DIR FABRIC.textproto ...   a cluster of one worker, then of two
+    bench/scaling.py workers OUT_DIR FABRIC.textproto ...   a cluster of one worker, all of it on one
+                                                            core, the same with a core for the
+                                                            coordinator, and one of two workers
     bench/scaling.py sizes OUT_DIR FABRIC.textproto         ever more repeats of one weave
 
 Each pair must give one content, or the command fails. Wants idle cores: times are wall times,
@@ -89,12 +91,12 @@ def cpu_of_threads(pid):
 class Cluster:
     """`weft up` with workers of one thread each, on a state folder of its own."""
 
-    def __init__(self, state, workers):
+    def __init__(self, state, workers, on_cores):
         shutil.rmtree(state, ignore_errors=True)
         self.program = subprocess.Popen(
             [WEFT, "up", "--workers", str(workers), "--threads", "1", "--state", state,
              "--listen", "127.0.0.1:0", "--json"], text=True, stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL)
+            stderr=subprocess.DEVNULL, preexec_fn=lambda: os.sched_setaffinity(0, on_cores))
         text = ""
         while True:  # one JSON value, over as many lines as it takes
             line = self.program.stdout.readline()
@@ -115,8 +117,10 @@ class Cluster:
         self.program.wait()
 
 
-def cluster_job(description, out, workers, quality):
-    with Cluster(out / "state", workers) as cluster:
+def cluster_job(description, out, quality, workers, core_count):
+    """The job by a cluster and the one who submits it, together on so many cores."""
+    on_cores = sorted(os.sched_getaffinity(0))[:core_count]
+    with Cluster(out / "state", workers, on_cores) as cluster:
         pid = cluster.about["pid"]
         address = cluster.about["coordinator"]
         database = out / f"{description.stem}-workers.h5"
@@ -125,7 +129,8 @@ def cluster_job(description, out, workers, quality):
         since = time.monotonic()
         subprocess.run([WEFT, "submit", description, "--quality", quality, "--wait", "-o", database,
                         "--coordinator", address], check=True, stdout=subprocess.DEVNULL,
-                       stderr=subprocess.DEVNULL)
+                       stderr=subprocess.DEVNULL,
+                       preexec_fn=lambda: os.sched_setaffinity(0, on_cores))
         seconds = time.monotonic() - since
         threads = cpu_of_threads(pid)
         return (seconds, cpu_seconds(pid) - before,
@@ -134,13 +139,16 @@ def cluster_job(description, out, workers, quality):
 
 
 def workers(arguments):
-    print_head(["fabric", "one worker", "two", "over half of one",
+    print_head(["fabric", "one worker, all on one core", "one worker, two cores", "two workers",
+                "over half of one core", "over half of one worker",
                 "CPU of the coordinator, of the workers (two)", "scheduling at most"])
     for description in arguments.fabrics:
-        one, two = (cluster_job(description, arguments.out, count, arguments.quality)
-                    for count in (1, 2))
+        alone, one, two = (cluster_job(description, arguments.out, arguments.quality, *size)
+                           for size in ((1, 1), (1, 2), (2, 2)))
+        same_content(alone[3], two[3])
         same_content(one[3], two[3])
-        print_row([description.stem, f"{one[0]:.1f} s", f"{two[0]:.1f} s",
+        print_row([description.stem, f"{alone[0]:.1f} s", f"{one[0]:.1f} s", f"{two[0]:.1f} s",
+                   f"{100 * (2 * two[0] / alone[0] - 1):+.1f} %",
                    f"{100 * (2 * two[0] / one[0] - 1):+.1f} %", f"{two[1]:.2f} s, {two[2]:.1f} s",
                    f"{100 * two[4] / (two[1] + two[2]):.2f} %"])
 
