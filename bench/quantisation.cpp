@@ -134,21 +134,20 @@ void print_row(const std::string& name, const fabric::Tile& tile) {
 }  // namespace weft::bench
 
 int main(int count, char** arguments) {
-  using namespace weft;
   std::vector<std::string> paths(arguments + 1, arguments + count);
   const bool paper = std::erase(paths, "--paper") > 0;
   fmt::print("| fabric | pixels at edges |");
   std::string rule = "|---|---|";
-  for (const bench::Layout& layout : bench::kLayouts) {
+  for (const weft::bench::Layout& layout : weft::bench::kLayouts) {
     fmt::print(" {} of {} bits, {} B |", layout.components, layout.bits,
                layout.components * static_cast<unsigned>(layout.bits) / 8);
     rule += "---|";
   }
   fmt::print("\n{}\n", rule);
   for (const std::string& path : paths) {
-    bench::print_row(std::filesystem::path(path).stem().string(),
-                     fabric::build_tile(fabric::load_description(
-                         path, paper ? v1::QUALITY_PAPER : v1::QUALITY_PREVIEW)));
+    weft::bench::print_row(std::filesystem::path(path).stem().string(),
+                           weft::fabric::build_tile(weft::fabric::load_description(
+                               path, paper ? weft::v1::QUALITY_PAPER : weft::v1::QUALITY_PREVIEW)));
   }
   return 0;
 }

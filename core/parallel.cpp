@@ -35,8 +35,26 @@ class Deal {
     }
   }
 
+  // Threads that take part beside the caller, so that there are `threads` together, or as many as
+  // the system gives.
+  [[nodiscard]] std::vector<std::jthread> helpers(std::size_t threads) {
+    std::vector<std::jthread> helpers;
+    try {
+      while (helpers.size() + 1 < threads) {
+        helpers.emplace_back([this] {
+          take_part();
+          helpers_cpu_seconds_ += thread_cpu_seconds();
+        });
+      }
+    } catch (const std::system_error&) {
+      // The caller takes the larger part.
+    }
+    return helpers;
+  }
+
   // REQUIRES: all threads are done.
-  void rethrow() const {
+  void end() const {
+    add_thread_cpu_seconds(helpers_cpu_seconds_);
     if (failure_) {
       std::rethrow_exception(failure_);
     }
@@ -46,6 +64,7 @@ class Deal {
   std::atomic<std::size_t> end_;
   const std::function<void(std::size_t)>& work_;
   std::atomic<std::size_t> next_{0};
+  std::atomic<double> helpers_cpu_seconds_{0};
   std::mutex mutex_;
   std::exception_ptr failure_;
 };
@@ -54,27 +73,14 @@ class Deal {
 
 void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work,
                  unsigned most_threads) {
-  Deal deal(count, work);
   const unsigned cores =
       most_threads == kAllCores ? std::max(1U, std::thread::hardware_concurrency()) : most_threads;
-  const std::size_t threads = std::min<std::size_t>(cores, count);
-  std::atomic<double> helpers_cpu_seconds{0};
+  Deal deal(count, work);
   {
-    std::vector<std::jthread> others;
-    try {
-      while (others.size() + 1 < threads) {
-        others.emplace_back([&] {
-          deal.take_part();
-          helpers_cpu_seconds += thread_cpu_seconds();
-        });
-      }
-    } catch (const std::system_error&) {
-      // There are as many threads as the system gives.
-    }
+    const std::vector<std::jthread> helpers = deal.helpers(std::min<std::size_t>(cores, count));
     deal.take_part();
   }
-  add_thread_cpu_seconds(helpers_cpu_seconds);
-  deal.rethrow();
+  deal.end();
 }
 
 }  // namespace weft::core

@@ -14,13 +14,16 @@ double seconds_of(clockid_t clock) {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-thread_local double helpers_cpu_seconds = 0;
+double& helpers_cpu_seconds() {
+  thread_local double seconds = 0;
+  return seconds;
+}
 
 }  // namespace
 
-double thread_cpu_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID) + helpers_cpu_seconds; }
+double thread_cpu_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID) + helpers_cpu_seconds(); }
 
-void add_thread_cpu_seconds(double helpers_seconds) { helpers_cpu_seconds += helpers_seconds; }
+void add_thread_cpu_seconds(double helpers_seconds) { helpers_cpu_seconds() += helpers_seconds; }
 
 double process_cpu_seconds() { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
 
