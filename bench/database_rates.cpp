@@ -28,7 +28,8 @@
 
 namespace {
 
-using namespace weft;
+namespace core = weft::core;
+namespace storage = weft::storage;
 
 // Prints what `work` takes for a file of so many bytes.
 template <class Work>

@@ -78,7 +78,8 @@ class ChunksTest : public testing::Test {
   void TearDown() override { std::filesystem::remove(file_); }
 
   // The bytes of a file with this dataset, which `fill` fills.
-  std::string file_with(const Dataset& made, const std::function<void(hid_t)>& fill) const {
+  [[nodiscard]] std::string file_with(const Dataset& made,
+                                      const std::function<void(hid_t)>& fill) const {
     const Session session;
     {
       const Handle file(H5Fcreate(file_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
@@ -109,7 +110,7 @@ class ChunksTest : public testing::Test {
     fill(dataset.id());
   }
 
-  std::string file_with(const Dataset& made, const Bytes& data) const {
+  [[nodiscard]] std::string file_with(const Dataset& made, const Bytes& data) const {
     return file_with(made, [&](hid_t dataset) {
       const Handle type = type_for(made);
       ASSERT_GE(H5Dwrite(dataset, type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, data.data()), 0);
@@ -117,8 +118,8 @@ class ChunksTest : public testing::Test {
   }
 
   // With one chunk, at the beginning, that is stored as these bytes.
-  std::string file_with_chunk(const Dataset& made, const std::string& stored,
-                              std::uint32_t skipped = 0) const {
+  [[nodiscard]] std::string file_with_chunk(const Dataset& made, const std::string& stored,
+                                            std::uint32_t skipped = 0) const {
     return file_with(made, [&](hid_t dataset) {
       const Extents at(made.shape.size(), 0);
       ASSERT_GE(
@@ -148,7 +149,7 @@ class ChunksTest : public testing::Test {
   }
 
   // What HDF5 itself makes of the dataset.
-  Bytes read_by_the_library(const Dataset& made, const std::string& file) const {
+  [[nodiscard]] Bytes read_by_the_library(const Dataset& made, const std::string& file) const {
     core::write_file_atomically(file_, file);
     const Session session;
     const Handle opened(H5Fopen(file_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
@@ -175,7 +176,7 @@ std::vector<ChunkFilters> all_filters() {
 }
 
 TEST_F(ChunksTest, WhatTheLibrarysOwnFiltersWroteReadsTheSame) {
-  const Dataset kMade[] = {
+  const Dataset all_made[] = {
       {Element::kF32, 4, {1000, 3}, {64, 3}, {}},  // the last chunk is cut
       {Element::kF32, 4, {40000}, {40000}, {}},    // more than a block of the checksum
       {Element::kU16, 2, {700}, {1}, {}},          // more than a batch
@@ -186,7 +187,7 @@ TEST_F(ChunksTest, WhatTheLibrarysOwnFiltersWroteReadsTheSame) {
       {Element::kText, 7, {13}, {5}, {}},  // an odd number of bytes
       {Element::kText, 1, {33}, {8}, {}},
   };
-  for (Dataset made : kMade) {
+  for (Dataset made : all_made) {
     const Bytes data = some_bytes(bytes_of(made));
     for (const ChunkFilters& filters : all_filters()) {
       made.filters = filters;
@@ -240,7 +241,8 @@ TEST_F(ChunksTest, EveryOtherByteInAChunkIsRefused) {
       std::string damaged = file;
       char& byte = damaged[extent.offset + i];
       byte = static_cast<char>(
-          byte ^ (1 + core::Random(3, static_cast<std::uint32_t>(extent.offset + i)).below(255)));
+          static_cast<unsigned char>(byte) ^
+          (1 + core::Random(3, static_cast<std::uint32_t>(extent.offset + i)).below(255)));
       for (const Decoding decoding : kDecodings) {
         ASSERT_THAT(complaint_about(damaged, decoding), HasSubstr("/data is damaged"))
             << extent.offset << " " << i;
@@ -253,7 +255,7 @@ TEST_F(ChunksTest, EveryOtherByteInAChunkIsRefused) {
 class StreamTest : public ChunksTest {
  protected:
   // A chunk of so many of the dataset's bytes, shuffled and deflated.
-  std::string stream_of(std::size_t count) const {
+  [[nodiscard]] std::string stream_of(std::size_t count) const {
     Bytes data = data_;
     data.resize(count);
     std::string stream = filtered_chunks(data, count, 4, true).front().bytes;
@@ -315,7 +317,7 @@ TEST_F(ChunksTest, AChunkAsItIsHasTheLengthOfItsShape) {
 }
 
 TEST_F(ChunksTest, FiltersInAnotherOrderOrTwiceAreRefused) {
-  const std::function<void(hid_t)> kWays[] = {
+  const std::function<void(hid_t)> ways[] = {
       [](hid_t properties) {
         H5Pset_deflate(properties, 6);
         H5Pset_shuffle(properties);
@@ -330,7 +332,7 @@ TEST_F(ChunksTest, FiltersInAnotherOrderOrTwiceAreRefused) {
       },
   };
   const Dataset made{Element::kF32, 4, {256}, {256}};
-  for (const auto& way : kWays) {
+  for (const auto& way : ways) {
     {
       const Session session;
       const Handle file(H5Fcreate(file_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
