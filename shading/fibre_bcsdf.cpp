@@ -94,6 +94,14 @@ glm::vec3 turned(const FibreAngle& i, glm::vec2 turn, glm::vec2 axis) {
           -i.cos_theta * (turn.y * axis.x + turn.x * axis.y)};
 }
 
+// |v|, v = phi - pi: by its half, sin^2(v / 2) = (1 + cos phi) / 2, stable about 0.
+float from_straight_on(float cos_phi) {
+  const float s = std::sqrt(0.5f * (1 + cos_phi));
+  const float c = std::sqrt(0.5f * (1 - cos_phi));
+  return s < c ? 2 * asin_acute(std::min(s, 0.70710678f))
+               : kPi - 2 * asin_acute(std::min(c, 0.70710678f));
+}
+
 float largest(glm::vec3 rgb) { return std::max({rgb.x, rgb.y, rgb.z}); }
 
 // Where in the rows the longitude that is `pole` from the axis lies.
@@ -107,6 +115,15 @@ struct LobeAlbedos {
 };
 
 }  // namespace
+
+LobeOdds LobeOdds::at_most(float most) const {
+  LobeOdds scaled = *this;
+  if (const float sum = r + tt; sum > most) {
+    scaled.r *= most / sum;
+    scaled.tt = most - scaled.r;
+  }
+  return scaled;
+}
 
 struct FibreBcsdf::Tables {
   explicit Tables(const FibreMaterial& m);
@@ -323,6 +340,32 @@ BcsdfStep FibreBcsdf::scatter(glm::vec3 omega_o, const LobeOdds& odds, glm::vec3
   return {turned(i, turn, axis), throughput * (glm::vec3(1) - f) * t.lobes.c_tt * weight, true};
 }
 
+LobeDensities FibreBcsdf::densities(glm::vec3 omega_i, glm::vec3 omega_o,
+                                    const LobeOdds& odds) const {
+  const Tables& t = *tables_;
+  const FibreAngle i = fibre_angle(omega_i);
+  LobeDensities lobes;
+  if (t.furnace) {
+    lobes.tt = glm::vec3(i.cos_theta * kFurnaceValue);
+    lobes.pdf_tt = std::max(i.cos_theta, kCosineFloor) * kFurnaceValue;
+    return lobes;
+  }
+  const glm::vec2 gaussians = lobe_gaussians(t.lobes, i.theta, odds.o.theta);
+  if (!(std::max(gaussians.x, gaussians.y) > 0)) {
+    return lobes;
+  }
+  const float cos_phi = cos_phi_between(omega_i, i, omega_o, odds.o);
+  const LobePair s = bcsdf_lobes(t.lobes, i, gaussians, cos_phi);
+  const Row row = t.row(odds.row);
+  const float per_cos = 1 / std::max(i.cos_theta, kCosineFloor);
+  lobes.r = s.r * i.cos_theta;
+  lobes.tt = s.tt * i.cos_theta;
+  lobes.pdf_r = per_cos * t.peak_r * gaussians.x / ((1 - row.r.low - row.r.high) * kTwoPi);
+  lobes.pdf_tt = per_cos * t.peak_tt * gaussians.y / (1 - row.tt.low - row.tt.high) *
+                 t.azimuth.density(from_straight_on(cos_phi));
+  return lobes;
+}
+
 float FibreBcsdf::pdf(glm::vec3 omega_i, glm::vec3 omega_o) const {
   const Tables& t = *tables_;
   const FibreAngle i = fibre_angle(omega_i);
@@ -331,12 +374,7 @@ float FibreBcsdf::pdf(glm::vec3 omega_i, glm::vec3 omega_o) const {
     return cos_theta_i * kFurnaceValue;
   }
   const FibreAngle o = fibre_angle(omega_o);
-  // v from the half angle, sin^2(v / 2) = (1 + cos phi) / 2, stable about v = 0.
-  const float cos_phi = cos_phi_between(omega_i, i, omega_o, o);
-  const float s = std::sqrt(0.5f * (1 + cos_phi));
-  const float c = std::sqrt(0.5f * (1 - cos_phi));
-  const float v = s < c ? 2 * asin_acute(std::min(s, 0.70710678f))
-                        : kPi - 2 * asin_acute(std::min(c, 0.70710678f));
+  const float v = from_straight_on(cos_phi_between(omega_i, i, omega_o, o));
   return t.density_cos(t.row(row_of(o.pole)), lobe_gaussians(t.lobes, i.theta, o.theta),
                        t.azimuth.density(v)) /
          cos_theta_i;

@@ -23,6 +23,18 @@ struct LobeOdds {
   float tt = 0;
   FibreAngle o{};  // of omega_o
   float row = 0;   // where the tables are read for it
+
+  // The same, scaled where they sum to more than `most`.
+  [[nodiscard]] LobeOdds at_most(float most) const;
+};
+
+// Both lobes for one pair of directions: S_l cos(theta_i), and the density per solid angle in which
+// scatter() draws omega_i where it goes on by that lobe.
+struct LobeDensities {
+  glm::vec3 r{0};
+  glm::vec3 tt{0};
+  float pdf_r = 0;
+  float pdf_tt = 0;
 };
 
 // Where a path goes on, and with what throughput.
@@ -67,6 +79,9 @@ class FibreBcsdf {
   // together. u.y and u.z, in [0, 1), draw theta and phi.
   [[nodiscard]] BcsdfStep scatter(glm::vec3 omega_o, const LobeOdds& odds, glm::vec3 throughput,
                                   glm::vec3 u) const;
+  // `odds` are those of omega_o, whatever they were scaled by.
+  [[nodiscard]] LobeDensities densities(glm::vec3 omega_i, glm::vec3 omega_o,
+                                        const LobeOdds& odds) const;
   // The density that sample() draws from.
   [[nodiscard]] float pdf(glm::vec3 omega_i, glm::vec3 omega_o) const;
   // Integral of S cos(theta_i) over omega_i (maths of W17's ambient term); theta_o in radians.

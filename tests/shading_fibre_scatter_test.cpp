@@ -144,6 +144,47 @@ TEST_P(FibreScatter, HasItForOtherOddsToo) {
   expect_equal(moments, plain(throughput));
 }
 
+// Each lobe's weight is its S cos over the density in which it is drawn.
+TEST_P(FibreScatter, DrawsFromTheDensitiesOfItsLobes) {
+  const glm::vec3 throughput(0.9f, 0.3f, 0.6f);
+  const LobeOdds odds = bcsdf().odds(omega_o(), throughput).at_most(1);
+  for (std::uint64_t n = 0; n < 2000; ++n) {
+    core::Random random(kSeed, 6, n);
+    const glm::vec3 u = three_numbers(random);
+    const BcsdfStep step = bcsdf().scatter(omega_o(), odds, throughput, u);
+    if (!step.survives) {
+      continue;
+    }
+    const bool reflects = u.x < odds.r;
+    const LobeDensities lobes = bcsdf().densities(step.omega_i, omega_o(), odds);
+    const glm::vec3 scattered = reflects ? lobes.r : lobes.tt;
+    const float pdf = reflects ? odds.r * lobes.pdf_r : odds.tt * lobes.pdf_tt;
+    for (int c = 0; c < 3; ++c) {
+      // Directions are floats, whose rounding steep lobes and the axis make large.
+      EXPECT_NEAR(pdf * step.throughput[c], throughput[c] * scattered[c],
+                  2e-3f * throughput[c] * scattered[c] + 1e-6f);
+    }
+  }
+}
+
+TEST_P(FibreScatter, LobesAddUpToTheWhole) {
+  const LobeOdds odds = bcsdf().odds(omega_o(), glm::vec3(1));
+  for (std::uint64_t n = 0; n < 2000; ++n) {
+    core::Random random(kSeed, 7, n);
+    const glm::vec3 u = three_numbers(random);
+    const BcsdfSample drawn = bcsdf().sample(omega_o(), u.x, u.y, u.z);
+    const LobeDensities lobes = bcsdf().densities(drawn.omega_i, omega_o(), odds);
+    const glm::vec3 whole = bcsdf().evaluate_cos(drawn.omega_i, omega_o());
+    const float pdf = bcsdf().pdf(drawn.omega_i, omega_o());
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(lobes.r[c] + lobes.tt[c], whole[c], 1e-5f * whole[c]);
+    }
+    // sample() picks the lobes by shares that sum to one.
+    EXPECT_LE(std::min(lobes.pdf_r, lobes.pdf_tt), 1.0001f * pdf);
+    EXPECT_GE(std::max(lobes.pdf_r, lobes.pdf_tt), 0.9999f * pdf);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(PublishedMaterials, FibreScatter,
                          testing::Combine(testing::Values(0, 1, 2, 3, 4),
                                           testing::Values(0.0, -1.0, 1.35, -1.5707963)));
@@ -197,6 +238,18 @@ TEST(FibreScatter, BlackFibresEndMostPaths) {
   const LobeOdds odds = FibreBcsdf(black).odds(fibre_direction(0.2, 0), glm::vec3(1));
   EXPECT_LT(odds.r, 0.01f);
   EXPECT_EQ(odds.tt, 0);
+}
+
+TEST(FibreScatter, FurnaceTransmitsByItsDensity) {
+  const FibreBcsdf furnace = FibreBcsdf::furnace();
+  const glm::vec3 omega_o = fibre_direction(0.4, 1);
+  const glm::vec3 omega_i = fibre_direction(-0.9, 2);
+  const LobeDensities lobes =
+      furnace.densities(omega_i, omega_o, furnace.odds(omega_o, glm::vec3(1)));
+  EXPECT_EQ(lobes.r, glm::vec3(0));
+  EXPECT_EQ(lobes.pdf_r, 0);
+  EXPECT_FLOAT_EQ(lobes.tt.x, furnace.evaluate_cos(omega_i, omega_o).x);
+  EXPECT_FLOAT_EQ(lobes.pdf_tt, furnace.pdf(omega_i, omega_o));
 }
 
 TEST(FibreScatter, FurnaceKeepsTheThroughputAtOne) {

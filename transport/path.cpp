@@ -13,16 +13,6 @@ namespace weft::transport {
 
 namespace {
 constexpr float kFar = std::numeric_limits<float>::infinity();
-
-// The same odds, scaled where they sum to more than `most`.
-shading::LobeOdds at_most(shading::LobeOdds odds, float most) {
-  if (const float sum = odds.r + odds.tt; sum > most) {
-    odds.r *= most / sum;
-    odds.tt = most - odds.r;
-  }
-  return odds;
-}
-
 }  // namespace
 
 Path::Path(const Scene& scene, std::span<const shading::FibreBcsdf> materials,
@@ -86,7 +76,7 @@ bool Path::go_on(const shading::LobeOdds& odds, glm::vec3 u) {
 }
 
 bool Path::scatter(core::Random& random) {
-  const shading::LobeOdds odds = at_most(bcsdf_->odds(omega_o_, throughput_), 1);
+  const shading::LobeOdds odds = bcsdf_->odds(omega_o_, throughput_).at_most(1);
   const float u_lobe = random.uniform();
   const float u_theta = random.uniform();
   return go_on(odds, {u_lobe, u_theta, random.uniform()});
@@ -96,7 +86,7 @@ bool Path::scatter(glm::vec3 u, float worth, core::Random& random, std::vector<P
   shading::LobeOdds odds = bcsdf_->odds(omega_o_, throughput_);
   odds.r *= worth;
   odds.tt *= worth;
-  odds = at_most(odds, static_cast<float>(kMostOthers + 1 - std::min(kMostOthers, others.size())));
+  odds = odds.at_most(static_cast<float>(kMostOthers + 1 - std::min(kMostOthers, others.size())));
   // One number picks all, evenly spaced: neither lobe has more or fewer than it should by one.
   for (float u_lobe = u.x + 1; u_lobe < odds.r + odds.tt; u_lobe += 1) {
     const float u_theta = random.uniform();
