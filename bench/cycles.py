@@ -2,6 +2,7 @@
 """Path tracing of the same fibres by weft and by Blender's Cycles, samples per CPU second.
 
     bench/cycles.py FABRIC.textproto OUT_DIR [--quality Q] [--size N] [--depth D] [--threads N]
+                    [--weft PROGRAM ...]
 
 Wants Blender 3.4 (apt-get install blender). The same curves (weft export), the same orthographic
 view of the middle of 3 x 3 tiles from above, one light from a direction over a black ground, paths
@@ -54,15 +55,28 @@ integration {{ integrator: INTEGRATOR_PATH max_scatterings: {arguments.depth} }}
 """
 
 
-def weft_seconds(arguments, size_mm, samples):
+def weft_seconds(weft, arguments, size_mm, samples):
     scene = arguments.out / f"weft-{samples}.scene.textproto"
     scene.write_text(scene_text(size_mm, arguments, samples))
     before = children_seconds()
-    subprocess.run([WEFT, "render", arguments.fabric, "--scene", scene, "--device", "cpu",
+    subprocess.run([weft, "render", arguments.fabric, "--scene", scene, "--device", "cpu",
                     "--threads", str(arguments.threads), "-o", arguments.out / "weft.exr",
                     "--png", arguments.out / "weft.png"],
                    check=True, stdout=subprocess.DEVNULL)
     return children_seconds() - before
+
+
+def description_of(arguments):
+    """The fabric at the quality that is asked for: `weft export` takes it as an option, `weft
+    render` as the description says."""
+    text = arguments.fabric.read_text()
+    if arguments.quality:
+        quality = f"quality: QUALITY_{arguments.quality.upper()}"
+        text, places = re.subn(r"^precompute \{", "precompute { " + quality, text, flags=re.M)
+        text += "" if places else f"\nprecompute {{ {quality} }}\n"
+    description = arguments.out / arguments.fabric.name
+    description.write_text(text)
+    return description
 
 
 def children_seconds():
@@ -84,18 +98,20 @@ def cycles_seconds(arguments):
 
 def compare(arguments):
     arguments.out.mkdir(parents=True, exist_ok=True)
+    arguments.fabric = description_of(arguments)
     subprocess.run([WEFT, "export", arguments.fabric, "-o", arguments.out / "curves.pbrt",
-                    "--tiles", f"{TILES}x{TILES}"]
-                   + (["--quality", arguments.quality] if arguments.quality else []),
-                   check=True, stdout=subprocess.DEVNULL)
+                    "--tiles", f"{TILES}x{TILES}"], check=True, stdout=subprocess.DEVNULL)
     low, high = bounds(read_curves(arguments.out / "curves.pbrt"))
     size_mm = [b - a for a, b in zip(low, high)]
-    ours = [weft_seconds(arguments, size_mm, n) for n in (arguments.few, arguments.many)]
-    theirs = cycles_seconds(arguments)
     samples = arguments.size ** 2 * (arguments.many - arguments.few)
-    rates = {"weft": samples / (ours[1] - ours[0]), "cycles": samples / (theirs[1] - theirs[0])}
-    print(f"| {arguments.fabric.stem} | {arguments.depth} | {rates['weft']:,.0f} | "
-          f"{rates['cycles']:,.0f} | {rates['weft'] / rates['cycles']:.2f} |")
+    few, many = cycles_seconds(arguments)
+    theirs = samples / (many - few)
+    for weft in arguments.weft:
+        few, many = [weft_seconds(weft, arguments, size_mm, n)
+                     for n in (arguments.few, arguments.many)]
+        ours = samples / (many - few)
+        print(f"| {arguments.fabric.stem} | {arguments.depth} | {ours:,.0f} | {theirs:,.0f} | "
+              f"{ours / theirs:.2f} |")
 
 
 def curve_object(bpy, curves):
@@ -193,6 +209,8 @@ def main():
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--depth", type=int, default=16, help="scatterings of a path at most")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--weft", type=pathlib.Path, nargs="+", default=[WEFT],
+                        help="programs to measure, of several builds a row each")
     parser.add_argument("--few", type=int, default=1, help="samples of the shorter run")
     parser.add_argument("--many", type=int, default=17, help="samples of the longer run")
     compare(parser.parse_args())
