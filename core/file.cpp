@@ -30,17 +30,38 @@ std::string read_file(const std::filesystem::path& path, std::uint64_t limit_byt
     throw Error(Code::kNotFound, "cannot read " + path.string() +
                                      (is_folder ? ": it is a folder" : ": no such file"));
   }
-  std::string data;
-  std::string buffer(1 << 16, '\0');
-  while (in) {
-    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-    data.append(buffer, 0, static_cast<std::size_t>(in.gcount()));
-    if (data.size() > limit_bytes) {
+  const auto require_within = [&](std::uint64_t bytes) {
+    if (bytes > limit_bytes) {
       throw Error(Code::kResourceExhausted, path.string() + " is larger than the limit of " +
                                                 std::to_string(limit_bytes) + " bytes");
     }
+  };
+  // As much as the file says it holds at once; what it does not tell, as pipes do not, bit by bit.
+  std::string data;
+  const std::uint64_t stated_bytes = std::filesystem::file_size(path, failure);
+  if (!failure) {
+    require_within(stated_bytes);
+    data.resize(stated_bytes);
+    in.read(data.data(), static_cast<std::streamsize>(stated_bytes));
+    data.resize(static_cast<std::size_t>(in.gcount()));
+  }
+  std::string buffer;
+  while (in && in.peek() != std::ifstream::traits_type::eof()) {
+    buffer.resize(1 << 16);
+    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    data.append(buffer, 0, static_cast<std::size_t>(in.gcount()));
+    require_within(data.size());
   }
   return data;
+}
+
+void write_file_unsynced(const std::filesystem::path& path, std::string_view data) {
+  const Descriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);
+  if (!file.write(data)) {
+    throw_errno("write", path);
+  }
+  // The disk may begin; whoever syncs waits for less.
+  (void)::sync_file_range(file.value(), 0, 0, SYNC_FILE_RANGE_WRITE);
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view data) {

@@ -16,8 +16,12 @@ namespace weft::core {
 // after return the new one survives a power loss. Throws Error(kUnavailable) naming the path.
 void write_file_atomically(const std::filesystem::path& path, std::string_view data);
 
-// The last steps of the above for a file that is already written: sync `from`, rename it to `to`,
-// sync the folder. Both paths are in one file system.
+// Writes what publish_file is to publish. Throws Error(kUnavailable) naming the path, of which a
+// part may be written then.
+void write_file_unsynced(const std::filesystem::path& path, std::string_view data);
+
+// The last steps of write_file_atomically, of a file that is already written: sync `from`, rename
+// it to `to`, sync the folder. Both paths are in one file system.
 void publish_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 }  // namespace weft::core

@@ -116,15 +116,6 @@ struct LobeAlbedos {
 
 }  // namespace
 
-LobeOdds LobeOdds::at_most(float most) const {
-  LobeOdds scaled = *this;
-  if (const float sum = r + tt; sum > most) {
-    scaled.r *= most / sum;
-    scaled.tt = most - scaled.r;
-  }
-  return scaled;
-}
-
 struct FibreBcsdf::Tables {
   explicit Tables(const FibreMaterial& m);
 

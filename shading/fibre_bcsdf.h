@@ -25,7 +25,14 @@ struct LobeOdds {
   float row = 0;   // where the tables are read for it
 
   // The same, scaled where they sum to more than `most`.
-  [[nodiscard]] LobeOdds at_most(float most) const;
+  [[nodiscard]] LobeOdds at_most(float most) const {
+    LobeOdds scaled = *this;
+    if (const float sum = r + tt; sum > most) {
+      scaled.r *= most / sum;
+      scaled.tt = most - scaled.r;
+    }
+    return scaled;
+  }
 };
 
 // Both lobes for one pair of directions: S_l cos(theta_i), and the density per solid angle in which

@@ -293,7 +293,7 @@ core::Digest write_database(const FabricDatabase& database, const Recolouring& r
   file.replace(0, kUserBlockBytes, encode_user_block(block));
 
   const FileBeside beside(path);
-  core::write_file_atomically(beside.path(), file);
+  core::write_file_unsynced(beside.path(), file);
   // What we wrote ourselves is no stranger's: it is read here.
   file = std::string();
   file = core::read_file(beside.path(), block.file_bytes);

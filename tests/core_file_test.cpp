@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -58,6 +59,25 @@ TEST_F(FileTest, ReadsWhatWasWritten) {
   write_file_atomically(path_, "");
   EXPECT_EQ(read_file(path_), "");
   EXPECT_EQ(entries(), 1);
+}
+
+TEST_F(FileTest, ReadsFilesThatDoNotTellTheirLength) {
+  ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
+  const std::string data(200'000, 'x');
+  const std::jthread writer([&] { write_file_unsynced(path_, data); });
+  EXPECT_EQ(read_file(path_), data);
+  EXPECT_THAT(read_file("/proc/self/status"), HasSubstr("Name:"));
+  EXPECT_EQ(code_of([] { (void)read_file("/proc/self/status", 10); }), Code::kResourceExhausted);
+}
+
+TEST_F(FileTest, WhatIsWrittenUnsyncedIsReadAndPublished) {
+  write_file_unsynced(folder_ / "beside", "longer than what follows");
+  write_file_unsynced(folder_ / "beside", "new");
+  publish_file(folder_ / "beside", path_);
+  EXPECT_EQ(read_file(path_), "new");
+  EXPECT_EQ(entries(), 1);
+  EXPECT_EQ(code_of([this] { write_file_unsynced(folder_ / "absent" / "file", "x"); }),
+            Code::kUnavailable);
 }
 
 TEST_F(FileTest, MissingFileAndFolderAreNotFound) {
