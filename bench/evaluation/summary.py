@@ -66,6 +66,12 @@ def flat_tables(record):
             "brightness is off by more than 5 % (by two standard errors more):\n\n"
             + table(["fabric", "method", "configurations", "mean error, %", "RMSE, %",
                      "beyond 5 %"], near_rows))
+    apart = [abs(flat.signed([pair])[0]) for cases in groups.values()
+             for pair in pairs_of(cases.values(), "device", "precomputed")]
+    if apart:
+        text += (f"\n\nBrightness by the device and by the CPU: {100 * sum(apart) / len(apart):.2f} % "
+                 f"apart in the mean over {len(apart):,} configurations, {100 * max(apart):.1f} % at "
+                 "most.")
     wrong = [(f, m) for f, cases in groups.items() for answers in cases.values()
              for m, answer in answers.items() if answer["wrong_pixels"]]
     text += (f"\n\nPictures with a pixel that is negative or no number: {len(wrong)} of "
