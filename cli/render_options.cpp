@@ -1,6 +1,7 @@
 #include "cli/render_options.h"
 
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <utility>
@@ -54,6 +55,14 @@ std::string mistake_in_layers(const std::string& text) {
     return error.what();
   }
   return "";
+}
+
+// Pictures are OpenEXR whatever they are called; under these names nobody would open them as such.
+std::string mistake_in_picture_name(const std::string& name) {
+  const std::string ending = std::filesystem::path(name).extension().string();
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".tif"
+             ? name + " would hold OpenEXR: name it .exr; --png FILE writes a PNG as well"
+             : "";
 }
 
 }  // namespace
@@ -122,6 +131,7 @@ void add_file_options(CLI::App& command, RenderOptions& options) {
       .add_option("-o,--output", options.out,
                   "Picture to write (.exr); of an animation with a place for the number of the "
                   "frame, such as frame_%04d.exr")
+      ->check(mistake_in_picture_name)
       ->required();
   command.add_option("--png", options.png, "Preview to write as well (.png)");
   command.add_option("--exposure", options.exposure,

@@ -94,6 +94,10 @@ TEST(WrongUse, ARenderNodeThatIsNotThereOrCannotDrawAFileIsToldApart) {
                   {{"render", "--again", "no_such.exr", "-o", "x.exr"}, 3, "no_such.exr"}});
 }
 
+TEST(WrongUse, APictureThatWouldHaveAnotherFormatsNameIsRefused) {
+  expect_refused({{{"render", "silk.h5", "-o", "x.png"}, 2, "name it .exr"}});
+}
+
 TEST(WrongUse, AnUnknownNameExitsWithThreeAndSaysWhatThereIs) {
   const TestFolder folder;
   const TestCluster cluster(folder, "names", 0);
